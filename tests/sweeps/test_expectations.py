@@ -27,23 +27,20 @@ def rows(folder):
 def test_every_kind_of_quantity(tmp_path):
     path = study(
         tmp_path,
-        best={"quantity": "optimum", "between": ["5.9 um", "6100 nm"], "source": "by hand"},
-        apart={
-            "quantity": "optimum",
-            "case": "wide",
-            "minus": "small",
-            "between": ["3 um", "3 um"],
-            "chosen": "the widths",
-        },
-        most={"quantity": "mean_electrons", "at": "optimum", "between": [0, math.inf]},
         ratio={
             "quantity": "mean_electrons",
             "at": "4 um",
             "over": "6 um",
             "between": [0.40, 0.49],
+            "source": "by hand",
         },
         step={"quantity": "mean_electrons", "at": "4 um", "minus": "5 um", "between": [1, 2]},
-        pitch={"quantity": "nyquist_frequency", "at": "8 um", "between": ["62.5 lp/mm", 62.5]},
+        pitch={
+            "quantity": "nyquist_frequency",
+            "at": "8 um",
+            "between": ["62.5 lp/mm", "62500 lp/m"],
+            "chosen": "the widths",
+        },
         other={
             "quantity": "nyquist_frequency",
             "at": "8 um",
@@ -54,29 +51,57 @@ def test_every_kind_of_quantity(tmp_path):
     )
     result = sweep(path, tmp_path / "out", workers=1)
     found = rows(tmp_path / "out")
-    assert list(found) == ["best", "apart", "most", "ratio", "step", "pitch", "other"]
-    assert found["best"] == {
-        "expectation": "best", "case": "small", "quantity": "optimum", "found": "6.0",
-        "unit": "um", "least": "5.9", "most": "6.1", "verdict": "inside", "basis": "predicted",
-        "setting": "", "source": "by hand", "why": "",
+    assert list(found) == ["ratio", "step", "pitch", "other"]
+    assert found["ratio"] == {
+        "expectation": "ratio", "case": "small", "quantity": "mean_electrons",
+        "found": found["ratio"]["found"], "unit": "", "least": "0.4", "most": "0.49",
+        "verdict": "inside", "basis": "predicted", "setting": "", "source": "by hand", "why": "",
     }  # fmt: skip
-    assert (found["apart"]["found"], found["apart"]["verdict"]) == ("3.0", "inside")
-    assert (found["apart"]["basis"], found["apart"]["setting"]) == ("chosen", "the widths")
+    assert (found["pitch"]["basis"], found["pitch"]["setting"]) == ("chosen", "the widths")
     assert (found["other"]["basis"], found["other"]["setting"]) == ("calibrated", "the gap")
     assert (found["pitch"]["found"], found["other"]["found"]) == ("62.5", "50.0")
     # Areas: 16 / 36, of pixels of one fill factor.
     assert float(found["ratio"]["found"]) == pytest.approx(16 / 36, rel=0.02)
     assert float(found["step"]["found"]) < 0
     assert found["step"]["verdict"] == "missed"
-    assert found["most"]["most"] == ""
     means = {r["pixel.width [um]"]: r["mean_electrons"] for r in result.points[:5]}
     assert float(found["ratio"]["found"]) == pytest.approx(means[4.0] / means[6.0], rel=1e-5)
     said = "\n".join(closing_lines(result))
-    shares = "4 of 5 predicted, 1 of 1 chosen, 1 of 1 calibrated"
-    assert f"expected.csv: 6 of 7 expectations are met: {shares}" in said
+    shares = "1 of 2 predicted, 1 of 1 chosen, 1 of 1 calibrated"
+    assert f"expected.csv: 3 of 4 expectations are met: {shares}" in said
     assert "  missed: step: -" in said
     assert ", expected 1 to 2 e" in said
     assert result.summary()["missed"] == ["step"]
+
+
+EDGE = {
+    "scene.source": {"kind": "chart", "chart": "slanted-edge"},
+    "optics.f_number": 2,
+    "quality": ["mse"],
+}
+
+
+def test_optima_and_what_they_are_to_each_other(tmp_path):
+    """Sharpest where the lens is focused: as far on each side, the error is the same."""
+    focus = {"optics.defocus": {"values": ["-20 um", "0 um", "20 um"]}}
+    path = written(
+        tmp_path, EDGE, vary=focus, metrics=["mse"],
+        cases={"flat": {}, "moved": {"vary": {"optics.defocus": {"start": "-10 um",
+               "stop": "30 um", "count": 3}}}},
+        optimize={"metric": "mse", "goal": "min"},
+        expect={
+            "best": {"quantity": "optimum", "between": ["-0.1 um", "100 nm"]},
+            "apart": {"quantity": "optimum", "case": "moved", "minus": "flat",
+                      "between": ["9 um", "11 um"]},
+            "least": {"quantity": "mse", "at": "optimum", "between": [0, math.inf]},
+        },
+    )  # fmt: skip
+    result = sweep(path, tmp_path / "out", workers=1)
+    found = rows(tmp_path / "out")
+    assert [o.edge for o in result.optima] == ["", "low"]
+    assert (found["best"]["found"], found["best"]["verdict"]) == ("0.0", "inside")
+    assert (found["least"]["most"], found["least"]["verdict"]) == ("", "inside")
+    assert (found["apart"]["found"], found["apart"]["verdict"]) == ("none", "missed")
 
 
 def test_a_point_that_failed_leaves_it_unknown(tmp_path):

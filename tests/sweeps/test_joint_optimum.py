@@ -111,7 +111,7 @@ def test_a_study_of_two_parameters_writes_it(tmp_path):
     }
     (tmp_path / "study.yaml").write_text(yaml.safe_dump(study, sort_keys=False), encoding="utf-8")
     found = sweep(tmp_path / "study.yaml", tmp_path / "out", workers=1)
-    assert [(o.parameter, o.optimum, o.edge) for o in found.optima] == [
+    assert [(o.parameter, o.end, o.edge) for o in found.optima] == [
         ("optics.f_number", 2.0, "low"),
         ("exposure.time", 8.0, "high"),
     ]

@@ -322,7 +322,7 @@ def test_temporary_files_of_the_killed_go(tmp_path):
 
 
 def test_the_optimum_of_a_case_and_its_row(tmp_path):
-    """Mean electrons grow with the pixel: the optimum is the end of the range, and said to be."""
+    """Mean electrons grow with the pixel: there is no optimum, and the end of the range is told."""
     study = written(tmp_path, seeds=4, optimize=OPTIMIZE, cases={"a": {}, "b": {}})
     result = sweep(study, tmp_path / "out", workers=1)
     assert [f.edge for f in result.optima] == ["high", "high"]
@@ -331,7 +331,8 @@ def test_the_optimum_of_a_case_and_its_row(tmp_path):
         "case", "parameter", "unit", "optimum", "low", "high", "metric", "value",
     ]  # fmt: skip
     assert (first["case"], first["parameter"], first["unit"]) == ("a", "pixel.width", "um")
-    assert (first["optimum"], first["high"]) == ("6.0", "6.0")
+    assert (first["optimum"], first["low"], first["high"]) == ("none", "", "")
+    assert (result.optima[0].end, result.optimum_rows[0]["optimum"]) == (6.0, None)
     mean = np.mean([float(r["mean_electrons"]) for r in rows(tmp_path / "out")[8:12]])
     assert float(first["value"]) == pytest.approx(mean, rel=1e-5)  # six digits are written
 

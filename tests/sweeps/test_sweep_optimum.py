@@ -1,5 +1,7 @@
 """The optimum of a curve: where it is known, and how well its interval covers the truth."""
 
+import math
+
 import numpy as np
 import pytest
 from making import long_except
@@ -81,6 +83,20 @@ def test_the_ends_of_the_range_are_told():
     low, high = find_optimum(X, curve(3.0)[None], "min"), find_optimum(X, curve(20.0)[None], "min")
     assert (low.place, low.edge) == (5.3, "low")
     assert (high.place, high.edge) == (15.0, "high")
+
+
+def test_a_fit_that_dips_before_the_end_is_believed_outside_its_interval():
+    """Points that rise from the first on: a cubic through noise dips inside, a real one too."""
+    t = np.log(X / X[0])
+    rises = 1 + 0.3 * t**2 + 0.002 * t
+    noise = 0.002 * np.random.default_rng(3).standard_normal((4, len(X)))
+    flat = find_optimum(X, rises + noise - noise.mean(axis=0) - 0.004 * t, "min")
+    assert (flat.edge, flat.low) == ("low", 5.3)
+    assert flat.place > 5.3, "the cubic's own minimum"
+    dips = find_optimum(X, rises + noise / 20 - 0.025 * t, "min")
+    assert dips.edge == ""
+    assert 5.3 < dips.low <= X[0] * math.exp(0.023 / 0.6) <= dips.high
+    assert (rises - 0.025 * t).argmin() == 0, "the best point is the first one"
 
 
 def test_few_points():

@@ -185,19 +185,12 @@ def optimum_table(optima: "Sequence[CaseOptimum]") -> Table:
 
     rows = []
     for best in optima:
-        said = EDGES.get(best.edge, "")
+        said = f"best at {best.end:g}, the {best.edge} end of its range" if best.edge else ""
         if best.is_beyond_points:
             said = f"{said}; the fit reaches {best.fitted:.6g} between points".removeprefix("; ")
         rows.append([*map(cell_text, best.row), said])
     heads = ["case", "parameter", "unit", ">best", ">low", ">high", "metric", ">value", ""]
     return heads, rows
-
-
-EDGES = {
-    "low": "at the low end of its range: the optimum may lie beyond",
-    "high": "at the high end of its range: the optimum may lie beyond",
-}
-"""End of a range -> what is said of an optimum there."""
 
 
 def closing_lines(result: "SweepResult") -> list[str]:

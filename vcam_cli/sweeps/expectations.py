@@ -48,23 +48,36 @@ class PlannedExpectation:
     least: float
     most: float
     lookup: Lookup
+    optima: tuple[tuple[str, str], ...] = ()
+    """Case and parameter of each optimum that the number is taken from."""
 
     def result(self, findings: Findings) -> ExpectationResult:
         """Compare the number that was found with those that were expected."""
         value = table_number(self.lookup(findings))
-        verdict = "inside" if self.least <= value <= self.most else "missed"
-        if math.isnan(value):
+        verdict, said, cell = "missed", f"{value:g}", _finite_cell(value)
+        if none := self._without_optimum(findings):
+            said, cell = none, "none"
+        elif self.least <= value <= self.most:
+            verdict = "inside"
+        elif math.isnan(value):
             verdict = "unknown"
         item, name = self.item, self.name
-        summary = f"{name}: {value:g}, expected {self.least:g} to {self.most:g} {self.unit}"
+        summary = f"{name}: {said}, expected {self.least:g} to {self.most:g} {self.unit}"
         if item.why and verdict == "missed":
             summary = f"{summary.rstrip()} ({item.why})"
         row: tuple[Cell, ...] = (
-            name, self.case, item.quantity, _finite_cell(value), self.unit,
+            name, self.case, item.quantity, cell, self.unit,
             _finite_cell(self.least), _finite_cell(self.most), verdict, item.basis,
             item.setting, item.source, item.why,
         )  # fmt: skip
         return ExpectationResult(name, verdict, summary.rstrip(), item.basis, row)
+
+    def _without_optimum(self, findings: Findings) -> str:
+        """Return that a case the number needs has no optimum inside its range; "" otherwise."""
+        for best in (findings.optimum(*place) for place in self.optima):
+            if best is not None and best.edge:
+                return f"no optimum in {best.case}, best at the {best.edge} end of the range"
+        return ""
 
 
 def _finite_cell(value: float) -> Cell:
@@ -95,6 +108,7 @@ class _Planner:
         self._grid, self._cameras, self._name, self._item = cameras.grid, cameras, name, item
         self._case = self._known_case(item.case or next(iter(cameras.grid.cases)), "case")
         self._parameter = self._only_parameter()
+        self._optima: list[tuple[str, str]] = []
 
     def resolve(self) -> PlannedExpectation:
         """Return the expectation with the numbers that it names."""
@@ -106,7 +120,9 @@ class _Planner:
         least, most = (self._number(given, unit) for given in item.between)
         if least > most:
             raise self._wrong("between", f"{least:g} is more than {most:g}", "swap them")
-        return PlannedExpectation(self._name, item, self._case, unit, least, most, self._lookup())
+        lookup = self._lookup()
+        optima = tuple(self._optima)
+        return PlannedExpectation(self._name, item, self._case, unit, least, most, lookup, optima)
 
     def _wrong(self, key: str, message: str, remedy: str) -> BadInput:
         return self._grid.study.mistake((EXPECT, self._name, key), message, remedy)
@@ -154,6 +170,7 @@ class _Planner:
     def _optimum(self, case: str, name: str) -> Lookup:
         """Return the place of a case's optimum, or the value there."""
         path = self._varied("quantity").path
+        self._optima.append((case, path))
         return lambda findings: float(getattr(findings.optimum(case, path), name, math.nan))
 
     def _term(self, key: str) -> Lookup:

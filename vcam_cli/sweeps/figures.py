@@ -202,7 +202,8 @@ def _table(planned: PlannedFigure, series: Sequence[_Series]) -> tuple[tuple[str
             if s.low is not None and s.high is not None:
                 row[low], row[high] = s.low[i], s.high[i]
         if s.optimum is not None:
-            row = {**head, place: s.optimum.optimum, name: s.optimum.value}
+            at = s.optimum.end if s.optimum.edge else s.optimum.optimum
+            row = {**head, place: at, name: s.optimum.value}
             rows[*head.values(), "optimum"] = row | {"mark": s.optimum.mark}
     names = tuple(dict.fromkeys([*columns, *mark]))
     return names, [tuple(row.get(name, "") for name in names) for row in rows.values()]
@@ -272,7 +273,8 @@ def _optima(planned: PlannedFigure, findings: Findings) -> FigureContent:
         optimum = findings.optimum(case, parameter.path)
         if optimum is not None:
             rows.append((case, x, *optimum.row[3:6]))
-        if optimum is not None and not isinstance(optimum.optimum, str):
+        has_place = optimum is not None and not isinstance(optimum.optimum, str)
+        if optimum is not None and has_place and not optimum.edge:
             y, low, high = (np.array([v]) for v in (optimum.optimum, optimum.low, optimum.high))
             curves.append(Curve(case, np.array([x]), y, len(curves), None, True, low, high))
     if len(curves) > 1:

@@ -23,6 +23,7 @@ from vcam_cli.sweeps.optimum import (
     Optimum,
     bootstrap_means,
     excess_error,
+    range_end,
     snap_to_range,
     variance_of_mean,
     widened_interval,
@@ -116,10 +117,9 @@ def _along(
     if not follows:
         low = np.fmin(low, min(place, scale[max(0, best - 1)]))
         high = np.fmax(high, max(place, scale[min(len(scale) - 1, best + 1)]))
-    slack = 1e-9 * (scale[-1] - scale[0])
-    edge = "low" if place <= scale[0] + slack else "high" if place >= scale[-1] - slack else ""
     back = np.exp if axis[0] > 0 else np.asarray
     place, low, high = (snap_to_range(float(back(v)), axis) for v in (place, low, high))
+    edge = range_end((place, low, high), best, axis)
     return Optimum(place, low, high, value, edge, fitted)
 
 

@@ -38,7 +38,8 @@ def _misses(limit: Limit, result: SweepResult) -> Iterator[str]:
     if limit.metric == OPTIMUM:
         for best in result.optima:
             if not limit.holds(float(best.optimum)):
-                yield limit.miss(float(best.optimum), f"case {best.case}")
+                none = f": best at the {best.edge} end of the range" if best.edge else ""
+                yield limit.miss(float(best.optimum), f"case {best.case}{none}")
         return
     rows = result.mean_rows
     values = [math.nan if row[limit.metric] in (None, "") else row[limit.metric] for row in rows]

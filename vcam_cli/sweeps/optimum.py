@@ -64,7 +64,7 @@ class Optimum:
     value: float
     """The metric at the optimum, no better than at the best point."""
     edge: str = ""
-    """low | high: the range ends there, and the metric may get better beyond it."""
+    """low | high: there is no optimum inside the range; this end is as good as any place in it."""
     fitted: float = math.nan
     """The metric of the fit there, which may be better than at any point; nan without a fit."""
 
@@ -92,14 +92,26 @@ def find_optimum(parameter: Array, curves: Array, goal: str) -> Optimum:
         i = int(y.mean(axis=0).argmin())
         low = np.fmin(low, min(best, scale[max(0, i - 1)]))
         high = np.fmax(high, max(best, scale[min(len(x) - 1, i + 1)]))
-    edge = ""
-    if len(x) > 1 and best in (scale[0], scale[-1]):
-        edge = "low" if best == scale[0] else "high"
     back = np.exp if x[0] > 0 else np.asarray
     place, low, high = (snap_to_range(float(back(v)), x) for v in (best, low, high))
+    edge = range_end((place, low, high), int(y.mean(axis=0).argmin()), x)
     sign = 1 if goal == "min" else -1
     inside = max(value, float(y.mean(axis=0).min()))
     return Optimum(place, low, high, sign * inside, edge, sign * value)
+
+
+def range_end(interval: tuple[float, float, float], best: int, x: Array) -> str:
+    """Return the end of the range, low or high, that is as good as any place in it; "" for none.
+
+    An optimum lies inside where points on both sides of the best one are worse. Where the best
+    point is an end, the fit may have its optimum before it: believed where its interval leaves that
+    end out. interval: place, low and high; x: the points, rising.
+    """
+    place, low, high = interval
+    last = len(x) - 1
+    if last > 0 and (place == x[0] or (best == 0 and low <= x[0])):
+        return "low"
+    return "high" if last > 0 and (place == x[-1] or (best == last and high >= x[-1])) else ""
 
 
 def widened_interval(

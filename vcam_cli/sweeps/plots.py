@@ -42,7 +42,7 @@ class Curve:
     high: Array | None = None
     """From where to where each value may be."""
     optimum: CaseOptimum | None = None
-    """A cross, with its interval."""
+    """A cross, with its interval; a triangle at the end of the range where there is none."""
 
 
 @dataclass(frozen=True)
@@ -147,10 +147,20 @@ def _draw_curve(axes: Any, curve: Curve) -> None:
     elif curve.low is not None:
         axes.fill_between(curve.x, curve.low, curve.high, color=color, alpha=0.16, lw=0)
     if curve.optimum is not None:
-        best = curve.optimum
-        ends, values = [best.low, best.high], [best.value, best.value]
-        axes.plot(ends, values, color=color, lw=3.2, alpha=0.45, zorder=4, solid_capstyle="butt")
-        axes.plot(best.optimum, best.value, "x", ms=8, mew=1.8, color="black", zorder=5)
+        _draw_optimum(axes, curve.optimum, color)
+
+
+def _draw_optimum(axes: Any, best: CaseOptimum, color: str) -> None:
+    """Draw the cross and the interval of an optimum; where there is none, which end is best."""
+    if best.edge:
+        marker, side = ("<", "left") if best.edge == "low" else (">", "right")
+        axes.plot(best.end, best.value, marker, ms=8, mfc="none", mec="black", mew=1.2, zorder=5)
+        aside = {"xytext": (0, -9), "textcoords": "offset points", "va": "top", "ha": side}
+        axes.annotate("no optimum", (best.end, best.value), fontsize=6.5, **aside)
+        return
+    ends, values = [best.low, best.high], [best.value, best.value]
+    axes.plot(ends, values, color=color, lw=3.2, alpha=0.45, zorder=4, solid_capstyle="butt")
+    axes.plot(best.optimum, best.value, "x", ms=8, mew=1.8, color="black", zorder=5)
 
 
 def _draw_image(figure: Any, axes: Any, panel: Panel) -> None:

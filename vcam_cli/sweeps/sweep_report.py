@@ -25,7 +25,7 @@ def report_file(result: SweepResult, contents: Mapping[str, bytes]) -> dict[str,
     for best in result.optima:
         case, parameter, unit, optimum, low, high, metric, value = best.row
         interval = f" ({low} to {high})" if low != "" else ""
-        end = f", at the {best.edge} end of its range" if best.edge else ""
+        end = f", best at {best.end:g}, the {best.edge} end of its range" if best.edge else ""
         said = f"{parameter} {optimum}{interval} {unit}".rstrip()
         facts.append((f"best of {case}", f"{said}, {metric} {value}{end}"))
     facts += [(f"no figure {name}", why) for name, why in result.unmade.items()]

@@ -92,7 +92,10 @@ def error_cell(problems: Sequence[Problem]) -> str:
 
 @dataclass(frozen=True)
 class CaseOptimum:
-    """The optimum of a parameter in a case, its numbers rounded, nan where unknown."""
+    """The optimum of a parameter in a case, its numbers rounded, nan where unknown.
+
+    There is none where an end of the range is as good as any place in it.
+    """
 
     case: str
     parameter: str
@@ -102,9 +105,13 @@ class CaseOptimum:
     high: float
     metric: str
     value: float
+    """The metric there, or at the end of the range."""
     edge: str
+    """low | high: the end of the range that is best, where there is no optimum; else ""."""
+    end: float = math.nan
+    """That end."""
     fitted: float = math.nan
-    """What the fit says there, where that is not the value."""
+    """What the fit says at the optimum, where that is not the value."""
 
     @property
     def is_beyond_points(self) -> bool:
@@ -114,12 +121,16 @@ class CaseOptimum:
     @property
     def row(self) -> tuple[Cell, ...]:
         """The row of optimum.csv; what is not known is empty."""
-        cells = (getattr(self, name) for name in OPTIMUM_COLUMNS)
-        return tuple("" if _is_unknown(cell) else cell for cell in cells)
+        cells = {name: getattr(self, name) for name in OPTIMUM_COLUMNS}
+        if self.edge:
+            cells["optimum"] = "none"
+        return tuple("" if _is_unknown(cell) else cell for cell in cells.values())
 
     @property
     def mark(self) -> str:
-        """Its interval as tables of figures have it."""
+        """Its interval as tables of figures have it, or that there is none."""
+        if self.edge:
+            return f"no optimum: best at the {self.edge} end"
         return "optimum" if _is_unknown(self.low) else f"optimum {self.low:.6g} to {self.high:.6g}"
 
     @property

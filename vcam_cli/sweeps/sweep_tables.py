@@ -143,8 +143,10 @@ def _table_row(case: str, parameter: Parameter, found: Optimum, wanted: Optimize
     """Return an optimum with its numbers rounded."""
     numbers = (found.place, found.low, found.high, found.value, found.fitted)
     place, low, high, value, fitted = map(table_number, numbers)
-    about = (case, parameter.path, parameter.unit)
-    return CaseOptimum(*about, place, low, high, wanted.metric, value, found.edge, fitted)
+    about, none = (case, parameter.path, parameter.unit), math.nan
+    if found.edge:
+        return CaseOptimum(*about, none, none, none, wanted.metric, value, found.edge, place)
+    return CaseOptimum(*about, place, low, high, wanted.metric, value, "", none, fitted)
 
 
 def result(
