@@ -27,7 +27,6 @@ class Process:
     length: float = 20e-6
     film: float = 0.25e-6  # of polysilicon, over a photogate
     dark_area: float = 1e-4
-    dark_perimeter: float = 0.3e-10
     supply: float = 3.3
     acceptors: float = 8e22
     well: float = 1.5e-6
@@ -78,10 +77,14 @@ class Photodiode:
 
     def dark_rate(self, temperature: float = 300.0) -> float:
         """Electrons of a pixel [e/s]; the surface of a pinned diode makes none."""
-        p = self.process
-        edge = 0.0 if self.kind == "pinned" else p.dark_perimeter * self.perimeter
-        current = p.dark_area * self.area + edge
+        edge = 0.0 if self.kind == "pinned" else self.edge_current
+        current = self.process.dark_area * self.area + edge
         return silicon.doubled(current, temperature, 300.0, 8.0) / CHARGE
+
+    @property
+    def edge_current(self) -> float:
+        """Of the walls of the junction down to the end of what is depleted [A]."""
+        return self.process.dark_area * self.depths[1] * self.perimeter
 
     @property
     def diffusion(self) -> silicon.Diffusion:

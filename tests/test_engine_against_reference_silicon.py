@@ -186,8 +186,7 @@ def test_dark_current_of_a_junction(tmp_path):
     density = dark_density(
         n_i, {**JUNCTION, "x1": x1, "neutral": x3 - x2}, share * (x2 - x1), (1 - share) * (x2 - x1)
     )
-    edge = diode.process.dark_perimeter * diode.perimeter
-    rate = (density * diode.area + edge) / ref.CHARGE
+    rate = (density * diode.area + diode.edge_current) / ref.CHARGE
     setup = setup_of(camera, GRAY, continuous(lamp("D65")), quantum=flat(0.5))
     setup = replace(setup, aperture=(0.0, 0.0, *diode.side), dark_rate=rate)
     assert error(camera, ref.mean_electrons(setup)) < 1e-6

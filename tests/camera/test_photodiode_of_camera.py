@@ -433,7 +433,35 @@ class TestKinds:
         size = detector(made(tmp_path))
         assert pinned.dark_rate * CHARGE == pytest.approx(size.area * 1e-4, rel=1e-12)
         more = (open_.dark_rate - pinned.dark_rate) * CHARGE
-        assert more == pytest.approx(size.perimeter * 0.3e-10, rel=1e-9)
+        wall = open_.depths.x2 * 1e-4  # A/m, of the same density as the area
+        assert more == pytest.approx(size.perimeter * wall, rel=1e-9)
+
+    @pytest.mark.parametrize(
+        ("name", "expected"), [("0.35", 0.368), ("0.25", 0.230), ("0.18", 0.247)]
+    )
+    def test_the_wall_of_the_junction_leaks_as_its_floor_does(self, name, expected, tmp_path):
+        """10 nA/cm2 over x_j + W, W = eps / C with C averaged over the swing, by hand [pA/cm]."""
+        feature, reset, swing, c, phi, m, depth = {
+            "0.35": (0.35, 2.25, 1.38, 0.906e-3, 0.8, 0.36, 0.2e-6),
+            "0.25": (0.25, 2.25, 1.67, 1.762e-3, 0.99, 0.46, 0.143e-6),
+            "0.18": (0.18, 1.65, 1.12, 0.9925e-3, 0.727, 0.357, 0.103e-6),
+        }[name]
+        volts = reset - swing * (np.arange(4000) + 0.5) / 4000
+        wall = depth + EPSILON / np.mean(c * (1 + volts / phi) ** -m)
+        assert 1e-4 * wall * 1e10 == pytest.approx(expected, abs=5e-4)
+        rates = [
+            photodiode(made(tmp_path, technology={"from": f"cmos-{name}um", **own})).dark_rate
+            for own in ({}, {"dark_current": {"perimeter": "0 pA/cm"}})
+        ]
+        perimeter = 4 * (6.5 - 5.017 * feature) * 1e-6
+        found = (rates[0] - rates[1]) * CHARGE / perimeter
+        assert found == pytest.approx(1e-4 * wall, rel=1e-6)
+
+    def test_a_wall_without_a_density_is_refused(self, tmp_path):
+        own = yaml.safe_load(shipped.find("technologies", "cmos-0.35um").read_text("utf-8"))
+        del own["dark_current"]["area"]
+        text = refused(tmp_path, technology={"from": own})
+        assert "needs dark_current.area" in text
 
     def test_so_does_that_of_four_transistors(self, tmp_path):
         c = camera(tmp_path, LEFT | {"pixel.architecture": "aps-4t"})
@@ -451,7 +479,9 @@ class TestKinds:
             expected = 0.75 * math.exp(-a * 0.25e-6) * (1 - below)
             assert gate.quantum_efficiency.evaluate(wavelength) == pytest.approx(expected, rel=3e-3)
         open_ = self.of(tmp_path, "ndiff-psub")
-        assert gate.dark_rate == open_.dark_rate
+        # Its walls go down as far as what is depleted, those of a diffusion by the junction more.
+        walls = detector(made(tmp_path)).perimeter * (open_.depths.x2 - w) * 1e-4
+        assert (open_.dark_rate - gate.dark_rate) * CHARGE == pytest.approx(walls, rel=1e-6)
 
     def test_a_photogate_without_a_thickness(self, tmp_path):
         own = {"name": "x", "feature_size": "0.35 um", "voltage_swing": "1 V"}

@@ -35,6 +35,7 @@ MOST_DOUBLINGS = 60
 DOUBLING = 8.0
 """Rise of temperature that doubles a dark current where the technology does not say [K]."""
 _PATH = "pixel.photodetector.dark_current_density"
+_TECHNOLOGY = "pixel.technology.dark_current"
 
 
 def dark_rate(camera: CameraModel) -> float:
@@ -63,12 +64,30 @@ def dark_rate(camera: CameraModel) -> float:
             else _density_at_temperature(camera, made, density)
         )
         if own.kind != "pinned" and camera.pixel.architecture != "aps-4t":
-            per_length = _density_at_temperature(camera, made, made.dark_current.perimeter)
+            density = edge_density(camera, made)
+            per_length = _density_at_temperature(camera, made, density)
     if not per_area and not per_length:
         return 0.0
     size = detector(camera)
     current = per_area * size.area + per_length * size.perimeter
     return current / readout.ELEMENTARY_CHARGE * own.dark_current_scale
+
+
+def edge_density(camera: CameraModel, made: Process) -> float | None:
+    """Return the technology's dark current along the perimeter [A/m]; None where it gives none.
+
+    `geometry` takes the wall of the junction for silicon like that below it: the density per area,
+    over the junction's depth and its depletion region, which is as wide sideways as downward. A
+    photogate has no junction to go down to. Raises BadInput where numbers are missing.
+    """
+    given = made.dark_current.perimeter
+    if given != "geometry":
+        return given
+    need = Need(f"{_TECHNOLOGY}.perimeter", "the dark current of the perimeter from geometry")
+    keys = ("dark_current.area", "junction.depletion_width", "junction.depth")
+    gated = camera.pixel.photodetector.kind == "photogate"
+    density, width, *depth = made.require(need, *keys[: 2 if gated else 3])
+    return float(density * (sum(depth) + depletion_width(camera, made, width, need)))
 
 
 def _junction_density(camera: CameraModel, made: Process) -> float:
@@ -140,8 +159,8 @@ def _density_at_temperature(camera: CameraModel, made: Process, density: float |
     if not density:
         return 0.0
     given = made.dark_current
-    doubling, path = given.doubling or DOUBLING, "pixel.technology.dark_current"
-    return density * _growth(camera, given.temperature, doubling, path)
+    doubling = given.doubling or DOUBLING
+    return density * _growth(camera, given.temperature, doubling, _TECHNOLOGY)
 
 
 def _growth(

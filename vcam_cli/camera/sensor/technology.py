@@ -149,8 +149,15 @@ class TechnologyDarkCurrent(Model):
     area: Annotated[float | None, Quantity("current_density", least=0)] = key(
         "per area", example="10 nA/cm2", default=None
     )
-    perimeter: Annotated[float | None, Quantity("linear_current_density", least=0)] = key(
-        "per length of perimeter", example="0.437 pA/cm", default=None
+    perimeter: Annotated[
+        float | Literal["geometry"] | None,
+        Quantity("linear_current_density", least=0, words={"geometry": "geometry"}),
+    ] = key(
+        "per length of perimeter; geometry: per area, times the height of the junction's wall, "
+        "junction depth plus depletion width",
+        unit="pA/cm",
+        example="geometry",
+        default=None,
     )
     temperature: MaybeSiliconTemperature = key("at which both hold", example="300 K", default=None)
     doubling: Annotated[float | Literal["silicon"] | None, DOUBLING] = key(
@@ -234,7 +241,7 @@ class Numbers(Model):
     )
     dark_current: TechnologyDarkCurrent = key(
         "dark current of the photodiode",
-        example={"area": "10 nA/cm2", "perimeter": "0.437 pA/cm"},
+        example={"area": "10 nA/cm2", "perimeter": "geometry"},
         default=TechnologyDarkCurrent,
     )
     quantum_efficiency_scale: MaybeFraction = key(
