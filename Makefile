@@ -57,10 +57,6 @@ tables: $(VENV)/.dev  ## the data tables of the package, from colour-science
 	$(BIN)/python scripts/make_tables.py
 
 thesis: $(VENV)/.dev  ## docs/thesis.md, from the runs of its studies; minutes where nothing is kept
-	$(BIN)/vcam sweep pixel-size -q -o out/pixel-size > /dev/null
-	$(BIN)/vcam schedule captures-segments -q -o out/captures-segments > /dev/null
-	$(BIN)/vcam schedule captures-hdr-scene -q -o out/captures-hdr-scene > /dev/null
-	$(BIN)/vcam schedule captures-dark-room -q -o out/captures-dark-room > /dev/null
 	$(BIN)/python scripts/make_thesis.py
 
 lock: $(VENV)/.dev  ## new versions for reproducible installs
