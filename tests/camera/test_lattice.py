@@ -104,6 +104,23 @@ def test_the_sensor_holds_all_pixels_and_is_centered(tmp_path):
     assert (found.width, found.height) == pytest.approx((25.5e-6, 20e-6), rel=1e-12)
 
 
+def test_positions_from_the_upper_left_corner(tmp_path):
+    """Table 2.4's reference: a grid of 5 x 4 pixels of 5.5 x 4 um, its first center inside."""
+    at = [(5.5 * (i + 0.5), 4 * (j + 0.5)) for j in range(4) for i in range(5)]
+    header = "x_um,y_um,color\n"
+    corner = header + "".join(f"{x},{y},G\n" for x, y in at)
+    centered = header + "".join(f"{x - 13.75},{y - 8},G\n" for x, y in at)
+    pattern = {"array.pattern": {"positions": "places.csv", "origin": "corner"}}
+    one, two = scattered(tmp_path, corner, **pattern), scattered(tmp_path, centered)
+    (tmp_path / "places.csv").write_text(corner, "utf-8")
+    found, expected = places(one), np.array(at) * 1e-6 - (13.75e-6, 8e-6)
+    assert found.x == pytest.approx(expected[:, 0], abs=1e-15)
+    assert found.y == pytest.approx(expected[:, 1], abs=1e-15)
+    assert lattice(one).width == pytest.approx(27.5e-6, rel=1e-12)
+    (tmp_path / "places.csv").write_text(centered, "utf-8")
+    assert places(two).x == pytest.approx(found.x, abs=1e-15)
+
+
 def test_comments_blank_lines_and_spaces(tmp_path):
     text = "\ufeff# made by hand\n\nx_um, y_um ,color\n  1 , -2e0 ,  G \n\n# end\n"
     found = places(scattered(tmp_path, text))

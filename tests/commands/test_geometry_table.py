@@ -45,6 +45,18 @@ def test_the_thesis_s_tables():
     assert numbers(rows["wavelengths"])[:3] == [31, 400, 700]
 
 
+def test_coordinates_of_the_samples_in_space_and_angle():
+    """Centers of samples as wide as the resolution, over the side that the array sees."""
+    rows = printed()
+    image = 1 / (1 / 8e-3 - 1 / 0.5)
+    for name, side in (("column coordinates", SIDES[0]), ("row coordinates", SIDES[1])):
+        count, low, high, first, last = numbers(rows[name])[:5]
+        half = side / 2 * (1 - 1 / count)  # the count is rounded, one in 360 samples
+        assert (-low, high) == pytest.approx((half * 0.5 / image,) * 2, rel=3e-3)
+        angle = math.degrees(math.atan(half / image))
+        assert (-first, last) == pytest.approx((angle, angle), rel=3e-3)
+
+
 def test_depth_of_field_for_a_pixel():
     """f^2 / (N c) + f, and where 1 / d is N c / (f v) away from 1 / s (v: image distance)."""
     rows = printed()

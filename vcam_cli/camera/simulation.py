@@ -224,6 +224,11 @@ class Output(Model):
         " over bands, {sampling: point} the values at the wavelengths",
         default=False,
     )
+    radiance: Annotated[bool, Strict()] = key(
+        "also write radiance.exr: W/(sr m2 nm) of the scene as simulated, a channel a wavelength; a"
+        " scene again with {kind: hyperspectral, file: radiance.exr} and luminance: from-file",
+        default=False,
+    )
     dng: Annotated[bool, Strict()] = key(
         "also write raw.dng, for raw converters: of Bayer mosaics, gray and stacked pixels;"
         " compressed without loss where imagecodecs is installed",

@@ -42,6 +42,10 @@ def _scene(g: Mapping[str, float], step: float, band: tuple[float, float]) -> It
         yield "angular resolution", f"{g['sample_pitch_angle'] * 1e3:.4g} mrad"
         yield "spatial resolution", f"{_length(g['sample_pitch_scene'])}, {pitch}"
         yield "rows, columns", f"{g['scene_rows']} x {g['scene_columns']}, seen by the array"
+        rows = _centers(int(g["scene_rows"]), g)
+        columns = _centers(int(g["scene_columns"]), g)
+        yield "row coordinates", rows + ", downward from the axis"
+        yield "column coordinates", columns + ", to the right"
         yield "highest frequency", f"{g['highest_frequency'] / 1e3:.5g} lp/mm"
         yield "support of fx", _support(g["highest_frequency"], g["sensor_width"])
         yield "support of fy", _support(g["highest_frequency"], g["sensor_height"])
@@ -65,6 +69,15 @@ def _optics(g: Mapping[str, float]) -> Iterator[Row]:
     yield "depth of field", f"{near} to {far}, {circle}"
     yield "hyperfocal distance", _length(g["hyperfocal_distance"])
     yield "cut-off at 550 nm", f"{g['diffraction_cutoff_550nm'] / 1e3:.5g} lp/mm"
+
+
+def _centers(count: int, g: Mapping[str, float]) -> str:
+    """Return where the centers of a row or column of samples lie, in the scene and as angles."""
+    last = (count - 1) / 2
+    pitch, angle = g["sample_pitch_scene"], math.atan(last * g["sample_pitch_angle"])
+    places = "infinite" if math.isinf(pitch) else f"{-last * pitch:.5g} to {last * pitch:.5g} m"
+    ends = math.degrees(angle)
+    return f"{count} centers, {places}, {-ends:.4g} to {ends:.4g} deg"
 
 
 def _support(highest: float, side: float) -> str:

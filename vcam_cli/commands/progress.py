@@ -46,6 +46,7 @@ WORDS = {
     "files": "writing files",
     "irradiance": "spectral irradiance",
     "isetcam": "light for ISETCam",
+    "radiance": "light of the scene",
     "points": "checking all points",
     "sweep": "computing points",
     "frames": "computing frames",

@@ -28,7 +28,7 @@ from vcam_cli.processing import check as check_steps
 from vcam_cli.quality.display import display_screen
 from vcam_cli.scenes.build import SOURCE, check_channels
 from vcam_cli.scenes.hyperspectral import check_bands, check_coverage, check_place
-from vcam_cli.simulation import scene_bands, spectral_irradiance
+from vcam_cli.simulation import scene_bands, scene_radiance, spectral_irradiance
 from vcam_cli.simulation.output import isetcam_files, raw_dng
 from vcam_cli.simulation.scene_files import check_blur, read_map
 from vcam_cli.solve.effects import camera_effects
@@ -204,6 +204,7 @@ CHECKS: tuple[files.CameraCheck, ...] = (
     (readout_chain.check, "scene optics pixel array adc exposure"),
     (raw_dng.check, "pixel array exposure adc output"),
     (spectral_irradiance.check, "scene output"),
+    (scene_radiance.check, "scene output"),
     (isetcam_files.check, "pixel array exposure adc output"),
     (check_display, "optics scene pixel array quality display"),
 )

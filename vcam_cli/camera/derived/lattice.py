@@ -104,21 +104,26 @@ def _require_axis_inside(found: Places, pitch_x: float, pitch_y: float) -> None:
         raise bad(
             PATH,
             "the array lies beside the middle of the picture, from which x_um and y_um count",
-            f"subtract {middle[0]:.6g} from x_um and {middle[1]:.6g} from y_um",
+            f"write origin: corner beside positions, or subtract {middle[0]:.6g} from x_um and"
+            f" {middle[1]:.6g} from y_um",
         )
 
 
 def places(camera: CameraModel) -> Places:
     """Return the pixels of a camera whose pattern is a file of positions. Raises BadInput."""
     assert isinstance(camera.array.pattern, Positions)
-    file = camera.array.pattern.positions
+    file, origin = camera.array.pattern.positions, camera.array.pattern.origin
     with data_file_problems(file, PATH, REMEDY):
-        return _read(file, os.stat(file).st_mtime_ns, tuple(camera.array.filters))
+        changed = os.stat(file).st_mtime_ns
+        return _read(file, changed, tuple(camera.array.filters), origin)
 
 
 @lru_cache(maxsize=4)
-def _read(file: str, changed: int, filters: tuple[str, ...]) -> Places:
-    """Return the pixels of the file as it is now; `changed` tells one version from another."""
+def _read(file: str, changed: int, filters: tuple[str, ...], origin: str) -> Places:
+    """Return the pixels of the file as it is now; `changed` tells one version from another.
+
+    From a corner, the middle between the outermost pixels is that of the array.
+    """
     with data_file_problems(file, PATH, REMEDY):
         header, rows = read_table(file, MOST_PIXELS)
         if tuple(header) != HEADER:
@@ -134,4 +139,6 @@ def _read(file: str, changed: int, filters: tuple[str, ...]) -> Places:
             f"{file}: has pixels of color {unknown[0]!r}, which has no filter",
             f"add {unknown[0]}: and its spectrum to array.filters",
         )
+    if origin == "corner":
+        x_y -= (x_y.min(axis=0) + x_y.max(axis=0)) / 2
     return Places(x_y[:, 0], x_y[:, 1], colors)

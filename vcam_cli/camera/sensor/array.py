@@ -62,9 +62,13 @@ class Positions(Model):
     """Pixels at places of their own."""
 
     positions: File = key(
-        "CSV file with the columns x_um,y_um,color: places right of and below the optical axis, "
-        "which is the middle of the picture",
+        "CSV file with the columns x_um,y_um,color: places to the right of and below the origin",
         example="pixels.csv",
+    )
+    origin: Literal["center", "corner"] = key(
+        "center: the optical axis, which is the middle of the picture; corner: the upper-left "
+        "corner of the array, whose middle the axis meets",
+        default="center",
     )
 
 

@@ -93,8 +93,8 @@ class HeavyTailedNoise(NoiseSource):
         if given.rms is not None:
             rms = at_gain(given.rms, camera.exposure_gain)
         else:
-            scale = at_gain(given.scale, camera.exposure_gain)
-            rms = scale * tukey_lambda_spread(given.shape)
+            assert given.scale is not None  # the model has one of both
+            rms = at_gain(given.scale, camera.exposure_gain) * tukey_lambda_spread(given.shape)
         return cls(rms, given.shape) if rms else None
 
     def describe(self) -> str:

@@ -28,13 +28,15 @@ from vcam_cli.files.images.images import (
     read_samples,
 )
 from vcam_cli.files.images.rows import Attribute
-from vcam_cli.files.spectral.data import GAINS, SpectralData
+from vcam_cli.files.spectral.data import GAINS, SpectralData, finite_numbers
 from vcam_cli.scenes.hyperspectral import Quantity
 from vcam_cli.spectra import SPEED_OF_LIGHT
 
 ROWS_AT_ONCE = 64
 RADIANCE = ("W.m^-2.sr^-1", "W.m^-2.sr^-1.nm^-1")
 """The units of emissive channels, both per nanometer."""
+WHITE = "vcam:white"
+"""The attribute with the radiance per nanometer of a perfect white, a number a channel of light."""
 IRRADIANCE = "W.m^-2.nm^-1"
 """The unit of what falls on a surface, as vcam writes it."""
 _CHANNEL = re.compile(r"(S[0-3]|T)\.(\d*,?\d*(?:[Ee][+-]?\d+)?)([EPTGMkhdcmunp]?)(m|Hz)")
@@ -111,6 +113,7 @@ def open_spectral(path: Path, wavelengths: Mapping[str, float] | None = None) ->
         quantity: Quantity = "radiance" if named else "reflectance"
         if not named and spec.channelnames[found[0][1]].startswith("S"):
             quantity = _quantity(spec.get_string_attribute("emissiveUnits"))
+        white = _white(spec.get_string_attribute(WHITE), len(found), quantity)
         if spec.get_float_attribute("EV", 0.0) != 0.0:
             notes.append("its exposure compensation (EV) is not used")
         if source.seek_subimage(1, 0):
@@ -121,8 +124,22 @@ def open_spectral(path: Path, wavelengths: Mapping[str, float] | None = None) ->
         quantity=quantity,
         read=lambda: _read(path, tuple(index for _, index in found)),
         gain=GAINS[quantity],
+        white=white,
         notes=tuple(notes),
     )
+
+
+def _white(text: str, count: int, quantity: Quantity) -> np.ndarray | None:
+    """Return the radiance of a perfect white (count,) [W/(sr m2 m)], where the file has it."""
+    if not text or quantity != "radiance":
+        return None
+    try:
+        values = finite_numbers([float(part) for part in text.split(",")], WHITE)
+    except ValueError:
+        raise UnusableFile(f"has no numbers in its attribute {WHITE}", "remove it") from None
+    if len(values) != count or not values.any() or (values < 0).any():
+        raise UnusableFile(f"has another white in {WHITE} than its {count} channels", "remove it")
+    return values * GAINS["radiance"]
 
 
 def _channels(names: Sequence[str]) -> tuple[list[tuple[float, int]], list[str]]:

@@ -27,11 +27,11 @@ from vcam_cli.files.images.maps import write_map
 from vcam_cli.files.images.png import write_png
 from vcam_cli.files.images.rows import Attribute
 from vcam_cli.files.report import hash_file, hash_text, to_json
-from vcam_cli.files.spectral.exr import write_spectral
+from vcam_cli.files.spectral.exr import RADIANCE, WHITE, write_spectral
 from vcam_cli.files.tables import write_metrics
 from vcam_cli.parallel import ThreadPool
 from vcam_cli.processing.color_correction import CHROMATICITIES
-from vcam_cli.simulation import spectral_irradiance
+from vcam_cli.simulation import scene_radiance, spectral_irradiance
 from vcam_cli.simulation.figures import exposure_report
 from vcam_cli.simulation.frame import Frame
 from vcam_cli.simulation.output import isetcam_files, provenance, raw_dng, raw_file
@@ -103,6 +103,9 @@ def write(result: Photograph, folder: OutputFolder) -> None:
     if camera.output.irradiance:
         with result.stages("irradiance"):
             _irradiance(result, folder.new("irradiance.exr"))
+    if camera.output.radiance:
+        with result.stages("radiance"):
+            _radiance(result, folder.new("radiance.exr"))
     if camera.output.isetcam:
         with result.stages("isetcam"):
             watch = result.stages.watch
@@ -145,6 +148,30 @@ def _irradiance(result: Photograph, path: Path) -> None:
     }
     g = frame.layout.geometry
     write_spectral(path, nodes, planes(), (g.rows, g.columns), "W.m^-2.nm^-1", said)
+
+
+def _radiance(result: Photograph, path: Path) -> None:
+    """Write the radiance of the scene, wavelength by wavelength, and how it is a scene again."""
+    frame = result.frame
+    nodes, scene = scene_radiance.nodes(frame), scene_radiance.sampled_scene(frame)
+
+    def planes() -> Iterator[np.ndarray]:
+        for done, plane in enumerate(scene_radiance.planes(frame, scene, result.workers)):
+            result.stages.watch.step(done, len(nodes))
+            yield plane * 1e-9
+
+    (white,) = scene_radiance.band_means((scene.white,), nodes) * 1e-9
+    said = {
+        "name": frame.camera.name,
+        "vcam:version": vcam_cli.__version__,
+        "vcam:quantity": "spectral radiance of the scene, mean over each sample and over the"
+        " channel's band, which falls straight to 0 at the neighboring wavelengths",
+        "vcam:unit": "W/(sr m2 nm)",
+        "vcam:scene": scene_radiance.read_back(frame, scene),
+        WHITE: ",".join(f"{value:.9g}" for value in white),
+        "vcam:configHash": config_hash(frame.camera),
+    }
+    write_spectral(path, nodes, planes(), scene.shape, RADIANCE[1], said)
 
 
 def write_raw(result: Photograph, path: Path) -> None:
