@@ -184,12 +184,12 @@ class Number(Numeric):
         return float(value)
 
     def number_schema(self) -> dict[str, Any]:
-        """Return the JSON Schema of a bare number within limits, or a text in percent."""
-        percent = r"^\s*[+]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?\s*%\s*$"
-        if self.is_signed:
-            percent = percent.replace("[+]?", "[+-]?", 1)
+        """Return the JSON Schema of a bare number within limits, or a fraction or percentage."""
+        number = r"(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?"
+        sign = "[+-]?" if self.is_signed else "[+]?"
+        text = rf"^\s*{sign}{number}\s*(%|/\s*{number}\s*%?)\s*$"
         bare = {"type": "number"} | self.limits
-        return {"anyOf": [bare, {"type": "string", "pattern": percent}]}
+        return {"anyOf": [bare, {"type": "string", "pattern": text}]}
 
     @property
     def hint(self) -> str:
