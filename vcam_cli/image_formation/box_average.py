@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from vcam_cli.arrays import Array
@@ -73,6 +75,10 @@ def _chart_averages(
 ) -> Array:
     """Paint the chart on cells that are the collecting areas, and the gaps between them."""
     centers = pixel_centers(geometry, detector=True)
+    if any(
+        len(c) > 1 and c[1] - c[0] < s * (1 - SLIVER) for c, s in zip(centers, size, strict=True)
+    ):
+        return _overlapping_averages(scene, mix, centers, size)
     (x_edges, step_x), (y_edges, step_y) = (
         _edges(c, s) for c, s in zip(centers, size, strict=True)
     )
@@ -83,6 +89,47 @@ def _chart_averages(
         painted = scene.chart.crop_to_cells(x_edges, cells).averages(x_edges, cells, mix)
         out[:, rows] = painted[:, ::step_y, ::step_x]
     return out
+
+
+def _overlapping_averages(
+    scene: ChartScene, mix: Array, centers: tuple[Array, Array], size: tuple[float, float]
+) -> Array:
+    """Return the same of collecting areas that overlap, as those of closely spaced places do.
+
+    The chart is painted on cells of half their distance, and summed up within each of them.
+    """
+    grids = [_grid(c, s) for c, s in zip(centers, size, strict=True)]
+    (x_edges, left, right), (y_edges, top, bottom) = grids
+    mix = np.asarray(mix, scene.dtype)
+    out = np.empty((len(mix), len(centers[1]), len(centers[0])), scene.dtype)
+    for rows in bands_of_rows(len(centers[1]), len(x_edges)):
+        first, last = int(top[rows.start]), math.ceil(bottom[rows.stop - 1])
+        cells = y_edges[first : last + 1]
+        painted = scene.chart.crop_to_cells(x_edges, cells).averages(x_edges, cells, mix)
+        sums = np.zeros((len(mix), len(cells), len(x_edges)))
+        sums[:, 1:, 1:] = painted.cumsum(axis=1, dtype=float).cumsum(axis=2)
+        across = _at(sums, right, 2) - _at(sums, left, 2)
+        inside = _at(across, bottom[rows] - first, 1) - _at(across, top[rows] - first, 1)
+        out[:, rows] = inside / ((right - left)[0] * (bottom - top)[0])
+    return out
+
+
+def _grid(center: Array, size: float) -> tuple[Array, Array, Array]:
+    """Return edges of cells [m], and where among them boxes begin and end, counted in cells."""
+    cell = (center[1] - center[0] if len(center) > 1 else size) / 2
+    low = (center - center[0]) / cell
+    count = math.ceil(low[-1] + size / cell + SLIVER)
+    edges = center[0] - size / 2 + cell * np.arange(count + 1)
+    return edges, low, low + size / cell
+
+
+def _at(sums: Array, place: Array, axis: int) -> Array:
+    """Return running sums between their places, where they are straight."""
+    index = np.minimum(place.astype(int), sums.shape[axis] - 2)
+    shape = (-1, 1) if axis == 1 else (-1,)
+    part = (place - index).reshape(shape)
+    below, above = (np.take(sums, index + step, axis=axis) for step in (0, 1))
+    return np.asarray(below + part * (above - below))
 
 
 def _edges(center: Array, size: float) -> tuple[Array, int]:

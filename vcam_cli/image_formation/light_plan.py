@@ -23,6 +23,7 @@ from vcam_cli.effects.base import (
     Gain,
     SeparableTransfer,
     SignalLevels,
+    StillWarp,
     Transport,
     VeilingGlare,
     Warp,
@@ -158,9 +159,18 @@ def _blur_shares(cost: LightCost, budget: float) -> dict[Effect, float]:
     """Return a bound on what each blur of a path changes, relative to full signal."""
     path, scene = cost.path, cost.scene
     transfer = path.transfer
+    g = path.geometry
+    averaged = min(g.collecting_width, g.collecting_height) if path.separable else 0.0
     spreads = {e: e.spread(transfer.wavelengths) for e in of_kind(path.effects, *BLURS)}
     losses = {
-        e: BlurLoss(transfer.weights, spread, e.largest_loss, e.is_even, e.is_uniform)
+        e: BlurLoss(
+            transfer.weights,
+            spread,
+            e.largest_loss,
+            e.is_even,
+            e.is_uniform,
+            averaged if e in of_kind(spreads, StillWarp) else 0.0,
+        )
         for e, spread in spreads.items()
         if spread is not None
     }

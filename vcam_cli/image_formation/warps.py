@@ -179,7 +179,10 @@ def warped_layers(path: OpticalPath, scene: AnyScene) -> tuple[Layers, SpectrumR
         image_layers(_share_of(rest, share), seen.at(wavelength))
         for wavelength, share in _groups(rest, seen, warps)
     ]
-    return chain(*(layers for layers, _ in found)), _joined(rest, [report for _, report in found])
+    reports = [report for _, report in found]
+    if not seen.is_magnified:
+        reports = [replace(own, warped_values=own.cells * own.planes) for own in reports]
+    return chain(*(layers for layers, _ in found)), _joined(rest, reports)
 
 
 @dataclass(frozen=True)
@@ -190,10 +193,16 @@ class _SeenScene:
     scene: Scene
     warps: Warps
 
+    @property
+    def is_magnified(self) -> bool:
+        """Whether still warps only magnify it."""
+        still = self.warps.still
+        return len(of_kind(still, Magnification)) == len(still)
+
     def at(self, wavelength: float) -> Scene:
         """Return the scene as a wavelength shows it on the sensor."""
-        magnifications = of_kind(self.warps.still, Magnification)
-        if len(magnifications) == len(self.warps.still):
+        if self.is_magnified:
+            magnifications = of_kind(self.warps.still, Magnification)
             factor = math.prod(each.factor(wavelength) for each in magnifications)
             return magnified(self.scene, factor) if factor != 1 else self.scene
         sees = self.warps.map_at(wavelength, _half(self.path, self.warps), moved=True)
@@ -405,7 +414,7 @@ def _groups(path: OpticalPath, seen: _SeenScene, warps: Warps) -> list[tuple[flo
     at = np.ravel([_on_sensor(warps, *corner, float(w)) for w in wavelengths]).reshape(-1, 2)
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(at, axis=0).T))])
     if way[-1] == 0:
-        return [(GREEN, np.ones(len(wavelengths)))]
+        return [(float(wavelengths[0]), np.ones(len(wavelengths)))]
     error = GroupError.of_chart(path, seen.chart)
     allowed = GROUPS_SHARE * path.settings.tolerance * path.full
     most = min(MOST_GROUPS, len(wavelengths))

@@ -43,6 +43,8 @@ class BlurLoss:
     change one of the four mirror images by all of what it changes in them."""
     is_uniform: bool = True
     """Whether it is the same everywhere."""
+    aperture: float = 0.0
+    """Width over which pixels average what it displaces [m]; 0 of a blur, which may act behind."""
 
     @property
     def level(self) -> Array:
@@ -86,7 +88,7 @@ WIDEST = 1.0
 """Spread of a blur of which no bound is known, in numbers that stay finite [m]."""
 
 
-def edge_energy(distance: Array, spread: Array, most: float) -> Array:
+def edge_energy(distance: Array, spread: Array, most: float, aperture: float = 0.0) -> Array:
     """Return G(u), what a blur changes of two edges of height 1 together, of each unit of length.
 
     Parameters
@@ -97,6 +99,9 @@ def edge_energy(distance: Array, spread: Array, most: float) -> Array:
         How far the blur displaces light in the mean (J,) [m].
     most : float
         Bound on |1 - H|.
+    aperture : float, optional
+        Width over which pixels average [m]: of a mean over p there is sinc(f p) of a wave, and
+        integral s^2 sinc(f p)^2 cos(2 pi f u) df = s^2 (1 - |u| / p) / p bounds what is displaced.
 
     Returns
     -------
@@ -106,6 +111,8 @@ def edge_energy(distance: Array, spread: Array, most: float) -> Array:
     from scipy.special import sici
 
     spread = np.minimum(spread, WIDEST).reshape(-1, *(1,) * distance.ndim)
+    if spread.max() < aperture / 2:
+        return np.asarray(spread**2 * np.maximum(1 - np.abs(distance) / aperture, 0) / aperture)
     end = most / (2 * np.pi * np.maximum(spread, 1e-30))  # where both bounds meet
     phase = 2 * np.pi * end * np.abs(distance)
     integral, _ = sici(phase)
@@ -134,7 +141,8 @@ def parallel_edges_change(places: Array, heights: Array, lengths: Array, loss: B
         Integrals (C, J) for each wavelength by itself [(e/s)^2 m^2].
     """
     steps = np.tensordot(loss.weights, heights, axes=(0, 0))  # (C, J, r, n)
-    both = edge_energy(np.subtract.outer(places, places), loss.spread, loss.most)
+    between = np.subtract.outer(places, places)
+    both = edge_energy(between, loss.spread, loss.most, loss.aperture)
     pairs = np.einsum("cjrm,jmn,cjrn->cjr", steps, both, steps, optimize=True)
     changes: Array = np.maximum(pairs, 0.0) @ lengths
     return changes
@@ -160,6 +168,10 @@ def squares_factor(pitch: float, loss: BlurLoss) -> Array:
         Factors (J,) without unit.
     """
     own = (loss.spread / pitch) ** 2
+    if (
+        loss.spread.max() < loss.aperture / 2
+    ):  # of shell m pixels leave 1 / (pi (m - 1/2) p / pitch)
+        return np.sqrt(own * (1 + (pitch / loss.aperture) ** 2))
     shell = np.arange(SHELLS) + 0.5
     others = np.minimum((loss.most / (2 * np.pi * shell)) ** 2, own[:, None])
     rest = (loss.most / (2 * np.pi)) ** 2 / SHELLS  # of the shells beyond, by their integral

@@ -2,8 +2,7 @@
 
 Cells of the sensor see parts of the chart that are no rectangles. Each is taken as two boxes, side
 by side along a diagonal, that have its center and its second moments. The chart is painted on finer
-cells, whose sums from the corner on give the mean over any box by four of their values; the finer
-cells' own width is taken from the boxes.
+cells, whose sums from the corner on give the mean over any box by four of their values.
 """
 
 from __future__ import annotations
@@ -29,8 +28,9 @@ MOST_PARTS = 4
 once, twice or three times still leave nothing."""
 TILE = 128
 """Cells along each side that are painted at once: over them the lens's scale hardly changes."""
-FINER = 1.5
-"""Finer cells along the side of the smallest box."""
+FINER = 2.0
+"""Finer cells along the side of the smallest box: an edge between them moves no center, and blurs
+by a quarter of what the box does, in second moments."""
 MOST_FINER = 8.0
 """Finer cells in a tile over its cells times `FINER` squared, at most: it is halved beyond."""
 POINTS = 4.0
@@ -41,8 +41,7 @@ DEGREES = (16, 32, 64, 128)
 PRECISE = 1e-11
 """Coefficients over the largest that a series does without: 1e-7 pixels of 10,000."""
 MOST_APART = 0.3
-"""Part of the second moments along x and y that the distance of two boxes makes, at most: what is
-left for the boxes is more than that of the finer cells."""
+"""Part of the second moments along x and y that the distance of two boxes makes, at most."""
 ROUND = 1e-3
 """Distance of two boxes below which they are one [finer cells]."""
 LOOKS = 33
@@ -310,20 +309,21 @@ class _Boxes:
         first = float((self.x - half_x).min()), float((self.y - half_y).min())
         return first, (float((self.x + half_x).max()), float((self.y + half_y).max()))
 
-    def halves(self, pitch: tuple[float, float]) -> tuple[Array, ...]:
-        """Return the pairs' displacements from their centers along x and y, widths and heights [m].
+    @property
+    def halves(self) -> tuple[Array, Array, Array, Array]:
+        """Displacements of a pair from its center along x and y, its width and height [m].
 
-        What cells of a pitch have of second moments by themselves is taken from the boxes.
+        The pair has the second moments of what its cell sees.
         """
         ratio = self.width / self.height
         size = np.abs(self.across)
-        least = [MOST_APART * length**2 / 12 for length in (self.width, self.height)]
-        size = np.minimum(size, np.minimum(least[0] / ratio, least[1] * ratio))
+        most = [MOST_APART * length**2 / 12 for length in (self.width, self.height)]
+        size = np.minimum(size, np.minimum(most[0] / ratio, most[1] * ratio))
         dx = np.sqrt(size * ratio)
         dy = np.copysign(np.sqrt(size / ratio), self.across)
         width, height = (
-            np.sqrt(np.square(length) - 12 * np.square(apart) - own**2)
-            for length, apart, own in zip((self.width, self.height), (dx, dy), pitch, strict=True)
+            np.sqrt(np.square(length) - 12 * np.square(apart))
+            for length, apart in ((self.width, dx), (self.height, dy))
         )
         return dx, dy, width, height
 
@@ -334,7 +334,7 @@ def _box_means(planes: Array, edges: Sequence[Array], box: _Boxes) -> Array:
 
     x, y = edges
     pitch = float(x[1] - x[0]), float(y[1] - y[0])
-    dx, dy, width, height = box.halves(pitch)
+    dx, dy, width, height = box.halves
     weights, index = [], []
     for sign in (-1, 1) if np.abs(dx).max() > ROUND * pitch[0] else (0,):
         columns, across = _ends(box.x + sign * dx - x[0], width, pitch[0], len(x))

@@ -15,8 +15,10 @@ from vcam_cli.effects.base import (
     Blur,
     Effect,
     FieldTransfer,
+    Magnification,
     PlaneTransfer,
     SeparableTransfer,
+    StillWarp,
     Warp,
     of_kind,
 )
@@ -78,6 +80,9 @@ RAY = 12e-9
 LOOK_UP = 3e-9
 """One value of a layer that a ray looks up, painted and composed [s]."""
 
+WARPED = 0.3e-6
+"""One cell of one plane of a chart looked up where a warp sees it, painted and averaged [s]."""
+
 DIRECTED = 4
 """Cost of a transfer function of fx and fy along a line over that of a round one."""
 ENTRIES = 2560
@@ -93,6 +98,9 @@ SHEARED = 3
 """Cost of pixels whose rows see the scene at other places over that of others."""
 ENTRIES_OF_PLANE = 150
 """Entries along an axis of a table over fx and fy, about."""
+WARPED_CELLS, COLOR_GROUPS = 6, 4
+"""Cells of a warped chart per pixel, and wavelengths at which a warp by color is followed, as often
+as not."""
 BEYOND = 1.25
 """Where the spectrum of a chart ends over where that of edges anywhere would, as often as not."""
 HIGHEST = 2.0
@@ -153,6 +161,7 @@ def _flat_seconds(geometry: Geometry, colors: int, report: SpectrumReport) -> fl
         + TERM * colors * report.far_filters * report.planes * cells_of_part
         + TABLE * report.table_values
         + PUPIL * bool(report.table_values)
+        + WARPED * report.warped_values
     )
 
 
@@ -211,8 +220,13 @@ class LightCost:
         tabulated = () if isinstance(self.scene, WAVES) else of_kind(blurs, Blur, FieldTransfer)
         lines = len(tabulated) + (DIRECTED - 1) * len(of_kind(tabulated, PlaneTransfer))
         otfs = lines * OTF * ENTRIES * len(self.path.transfer.wavelengths)
+        still, g = of_kind(blurs, StillWarp), self.path.geometry
         report = expected_report(self.path, self.scene, blurs)
-        return otfs + image_seconds(self.path.geometry, len(self.path.mosaic.colors), report)
+        seconds = otfs + image_seconds(g, len(self.path.mosaic.colors), report)
+        if len(still) > len(of_kind(still, Magnification)):
+            planes = min(PLANES, len(self.path.transfer.weights))
+            seconds += WARPED * WARPED_CELLS * planes * g.rows * g.columns
+        return seconds * (COLOR_GROUPS if any(warp.knots for warp in still) else 1)
 
 
 def expected_report(

@@ -1,0 +1,179 @@
+"""Distortion and color errors of the lens in whole frames: centers of points, refusals."""
+
+import numpy as np
+import pytest
+from making import QUIET, camera, radiance_for
+from moving_waves import COLUMNS, IMAGE, PITCH, ROWS
+
+from vcam_cli import load, plan, simulate
+from vcam_cli.errors import BadInput
+
+SPACING = 50e-6
+"""Of the points [m]: 10 pixels. Their diameter is 4.241 pixels, where J1(pi d) is 0: so pixels that
+are squares of light see the centers of discs where they are."""
+POINTS = {
+    "scene.source": {
+        "kind": "chart",
+        "chart": "point-grid",
+        "spacing": "50 um",
+        "diameter": "21.206 um",
+    },
+    "scene.radiance": radiance_for(20000),
+    "optics.diffraction": False,
+    "pixel.photodetector.fill_factor": 1.0,
+    "accuracy": "standard",
+    "effects": QUIET | {"quantization": "off"},
+}
+PIXEL = 0.01
+"""What centers of points may err [pixels]."""
+
+
+def seen(folder, changes: dict) -> np.ndarray:
+    return simulate(camera(folder, POINTS | changes)).mean_electrons.astype(float)
+
+
+def centers(image: np.ndarray, expected: np.ndarray) -> np.ndarray:
+    """Centroids x + i y [pixels from the center] near expected ones, by light within 4 pixels."""
+    found = []
+    for z in expected:
+        column, row = z.real + (COLUMNS - 1) / 2, z.imag + (ROWS - 1) / 2
+        left, top = round(column) - 4, round(row) - 4
+        part = image[top : top + 9, left : left + 9]
+        y, x = np.mgrid[top : top + 9, left : left + 9]
+        light = part.sum()
+        at = (part * x).sum() / light + 1j * (part * y).sum() / light
+        found.append(at - (COLUMNS - 1) / 2 - 1j * (ROWS - 1) / 2)
+    return np.array(found)
+
+
+def grid() -> np.ndarray:
+    """Points of the grid whose light lies on the array wherever it is displaced [pixels]."""
+    x, y = np.meshgrid(np.arange(-2, 3), np.arange(-1, 2))
+    return (x + 1j * y).ravel() * SPACING / PITCH
+
+
+FOCAL = IMAGE / PITCH
+"""Image distance [pixels]."""
+
+
+def imaged(place, points: np.ndarray) -> np.ndarray:
+    """Centers of light of discs about points: each part is as bright as it is large."""
+    radius, step = 0.5 * 21.206e-6 / PITCH, 1e-3
+    x, y = np.meshgrid(np.linspace(-radius, radius, 61), np.linspace(-radius, radius, 61))
+    disc = (x + 1j * y)[np.hypot(x, y) <= radius]
+    z = points[:, None] + disc
+    dx, dy = (place(z + step) - place(z)) / step, (place(z + 1j * step) - place(z)) / step
+    area = np.abs((dx.conj() * dy).imag)
+    return (place(z) * area).sum(axis=1) / area.sum(axis=1)
+
+
+def k1(z):
+    return z * (1 - 25 * np.abs(z / FOCAL) ** 2)
+
+
+@pytest.mark.parametrize(
+    ("lens", "place"),
+    [
+        ({"optics.distortion": {"k1": -25}}, k1),
+        (
+            {"optics.distortion": {"p1": 0.5, "k1": -10}},
+            lambda z: (
+                z * (1 - 10 * np.abs(z / FOCAL) ** 2)
+                + (z.real * z.imag + 0.5j * (np.abs(z) ** 2 + 2 * z.imag**2)) / FOCAL
+            ),
+        ),
+    ],
+)
+def test_points_lie_where_the_model_images_them(lens, place, tmp_path):
+    points = grid()
+    expected = imaged(place, points)
+    assert np.abs(expected - points).max() > 0.2
+    found = centers(seen(tmp_path, lens), expected)
+    assert np.abs(found - expected).max() < PIXEL
+
+
+def test_lateral_color_moves_points_by_their_mean_magnification(tmp_path):
+    """Of equal energy there are as many photons as the wavelength is long."""
+    light = {
+        "scene.illuminant": "equal-energy",
+        "scene.wavelengths": {"start": "500 nm", "stop": "600 nm"},
+        "optics.lateral_color": {"table": {500: "0 %", 600: "2 %"}},
+    }
+    w = np.linspace(500, 600, 2001)
+    mean = np.trapezoid(w * 0.02 * (w - 500) / 100, w) / np.trapezoid(w, w)
+    expected = grid() * (1 + mean)
+    found = centers(seen(tmp_path, light), expected)
+    assert np.abs(found - expected).max() < PIXEL
+
+
+def test_the_measured_lens_shows_what_was_measured(tmp_path):
+    """Magnification against 550 nm at two wavelengths, from the part that ships."""
+    table = load("starter").with_({"optics": "computar-8mm"}).optics.lateral_color
+    lens = {"optics.lateral_color": {"table": {f"{w:g}": f"{100 * m} %" for w, m in table.points}}}
+    points, found = grid(), {}
+    for wavelength in (500, 550, 700):
+        light = {"scene.illuminant": {"monochromatic": f"{wavelength} nm"}}
+        at = centers(seen(tmp_path, lens | light), points)
+        found[wavelength] = float((at * points.conj()).real.sum() / (np.abs(points) ** 2).sum())
+    assert found[500] / found[550] - 1 == pytest.approx(-0.85e-3, abs=2e-4)
+    assert found[700] / found[550] - 1 == pytest.approx(3.3e-3, abs=2e-4)
+
+
+def test_a_shift_of_focus_is_a_defocus_of_its_wavelength(tmp_path):
+    """Light of 450 nm is out of focus as if the sensor were there, that of 550 nm in focus."""
+    shift = {"optics.focus_shift": {"table": {450: "60 um", 550: "0 um", 650: "-90 um"}}}
+    for wavelength, defocus in ((450, 60), (550, 0), (600, -45)):
+        light = {
+            "scene.illuminant": {"monochromatic": f"{wavelength} nm"},
+            "optics.diffraction": True,
+        }
+        by_color = seen(tmp_path, light | shift)
+        by_defocus = seen(tmp_path, light | {"optics.defocus": f"{defocus} um"})
+        np.testing.assert_allclose(by_color, by_defocus, rtol=1e-6, atol=1e-3)
+
+
+def test_what_stays_below_a_hundredth_of_a_pixel_goes(tmp_path):
+    """A wall shows no distortion; a scene shows none of 0.003 pixels and all of 3."""
+    auto = {"effects": "auto"}
+    wall = {"scene.source": {"kind": "chart", "chart": "uniform"}}
+    edge = {"scene.source": {"kind": "chart", "chart": "slanted-edge"}}
+    for scene, coefficient, state in ((wall, -25, "off"), (edge, -0.02, "off"), (edge, -25, "on")):
+        lens = {"optics.distortion": {"k1": coefficient}}
+        found = plan(camera(tmp_path, POINTS | auto | scene | lens))
+        [effect] = [e for e in found.effects if e["name"] == "distortion"]
+        assert effect["state"] == state, (scene, coefficient)
+
+
+def message(folder, changes: dict) -> str:
+    with pytest.raises(BadInput) as error:
+        camera(folder, POINTS | changes)
+    return str(error.value)
+
+
+def test_what_cannot_be_imaged_is_refused(tmp_path):
+    folds = message(tmp_path, {"optics.distortion": {"k1": -400}})
+    assert "optics.distortion" in folds
+    assert "folds the image" in folds
+    beyond = message(
+        tmp_path, {"optics.projection": "equidistant", "optics.focal_length": "0.13 mm"}
+    )
+    assert "85 degrees" in beyond
+    both = {"optics.projection": "equisolid", "optics.distortion": {"model": "fisheye", "k1": 0.1}}
+    assert "contradicts" in message(tmp_path, both)
+    table = tmp_path / "d.csv"
+    table.write_text("image_height_mm,distortion_percent\n0,0\n0.1,0\n0.11,40\n")
+    assert "folds the image" in message(tmp_path, {"optics.distortion": {"file": str(table)}})
+    layer = {"source": {"kind": "chart", "chart": "uniform"}, "distance": "1 m"}
+    layers = {"kind": "layers", "layers": [layer]}
+    assert "depth or layers" in message(
+        tmp_path, {"scene.source": layers, "optics.distortion": {"k1": -1}}
+    )
+
+
+def test_the_corrected_picture_is_that_of_a_lens_that_does_not_distort(tmp_path):
+    """But for what two splines and two apertures blur: points lie where they belong."""
+    steps = [{"black_level": "subtract"}, {"lens_distortion": "correct"}, {"gamma": 1}]
+    changes = POINTS | {"optics.distortion": {"k1": -25}, "processing": steps}
+    picture = simulate(camera(tmp_path, changes)).linear[..., 0].astype(float)
+    points = grid()
+    assert np.abs(centers(picture, points) - points).max() < 0.05
