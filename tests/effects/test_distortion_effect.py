@@ -1,5 +1,8 @@
 """Distortion and color errors of the lens in whole frames: centers of points, refusals."""
 
+import math
+import struct
+
 import numpy as np
 import pytest
 from making import QUIET, camera, radiance_for
@@ -177,3 +180,19 @@ def test_the_corrected_picture_is_that_of_a_lens_that_does_not_distort(tmp_path)
     picture = simulate(camera(tmp_path, changes)).linear[..., 0].astype(float)
     points = grid()
     assert np.abs(centers(picture, points) - points).max() < 0.05
+
+
+def test_raw_dng_says_how_to_undo_it(tmp_path):
+    """WarpRectilinear has OpenCV's coefficients, in distances of the corner."""
+    from vcam_cli.files.images import dng_opcodes
+    from vcam_cli.simulation.output.raw_dng import _warp
+
+    k1, k2, p1 = -25.0, 900.0, 0.2
+    lens = {"optics.distortion": {"k1": k1, "k2": k2, "p1": p1}}
+    found = _warp(simulate(camera(tmp_path, POINTS | lens)).frame)
+    corner = math.hypot(ROWS, COLUMNS) / 2 / FOCAL
+    wanted = [[1, k1 * corner**2, k2 * corner**4, 0, p1 * corner, 0]]
+    np.testing.assert_allclose(found, wanted, atol=1e-9)
+    written = dng_opcodes.warp_rectilinear(found)
+    assert struct.unpack(">6L", written[:24]) == (1, 1, 0x01030000, 1, 4 + 6 * 8 + 16, 1)
+    assert struct.unpack(">8d", written[24:]) == (*found[0], 0.5, 0.5)

@@ -359,7 +359,7 @@ def _is_even(scene: AnyScene) -> bool:
     return isinstance(scene, WaveScene) and not any(w.fx or w.fy for w in scene.waves)
 
 
-def _as_chart(path: OpticalPath, scene: AnyScene) -> ChartScene:
+def _as_chart(path: OpticalPath, scene: Scene) -> ChartScene:
     """Return a scene as a chart on cells."""
     if isinstance(scene, HarmonicScene):
         return scene.chart

@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.files.images.dng_opcodes import gain_maps
+from vcam_cli.files.images.dng_opcodes import gain_maps, warp_rectilinear
 from vcam_cli.files.images.tiff import (
     GRAY,
     SOFTWARE,
@@ -75,6 +75,7 @@ CODES: dict[str, tuple[int, str]] = {
     "CalibrationIlluminant2": (50779, "H"),
     "ActiveArea": (50829, "I"),
     "OpcodeList2": (51009, "x"),
+    "OpcodeList3": (51022, "x"),
     "NoiseProfile": (51041, "d"),
 }
 """Tag -> its number, and its type as `files.tiff` has them."""
@@ -136,6 +137,8 @@ class RawImage:
     """Level of every code (N,), uint16; None where codes are levels."""
     baseline_exposure: float
     """Stops that bring the scene's white to the brightest of the picture [EV]."""
+    warp: Array | None
+    """Coefficients of WarpRectilinear (N, 6); None where the lens does not distort."""
     shading: Array | None
     """Factors (M, N) that make even light even, at places from edge to edge; None for 1."""
     noise: tuple[float, float]
@@ -246,6 +249,8 @@ def _tags(image: RawImage) -> list[Tag]:
     }
     if image.noise[0] > 0:  # else Adobe's reader warns of it
         said["NoiseProfile"] = [*image.noise] * (count if image.colors is None else 3)
+    if image.warp is not None:
+        said["OpcodeList3"] = warp_rectilinear(image.warp)
     if image.shading is not None:
         block = (len(image.block), len(image.block[0])) if image.block else (1, 1)
         said["OpcodeList2"] = gain_maps(image.codes.shape, block, image.shading)

@@ -9,7 +9,7 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 
-_GAIN_MAP, _SINCE, _MAY_BE_SKIPPED = 9, 0x01030000, 1
+_WARP_RECTILINEAR, _GAIN_MAP, _SINCE, _MAY_BE_SKIPPED = 1, 9, 0x01030000, 1
 
 
 def gain_maps(shape: tuple[int, ...], block: tuple[int, int], gains: Array) -> bytes:
@@ -43,3 +43,26 @@ def gain_maps(shape: tuple[int, ...], block: tuple[int, int], gains: Array) -> b
         said = area + acts_on + grid + values
         maps.append(struct.pack(">4L", _GAIN_MAP, _SINCE, _MAY_BE_SKIPPED, len(said)) + said)
     return struct.pack(">L", len(maps)) + b"".join(maps)
+
+
+def warp_rectilinear(coefficients: Array) -> bytes:
+    """Return an OpcodeList3 that takes the distortion of the lens out of a picture.
+
+    A place (x, y) of the corrected picture, counted from its center in distances of the corner, is
+    taken from x f + 2 kt0 x y + kt1 (r^2 + 2 x^2) and y f + 2 kt1 x y + kt0 (r^2 + 2 y^2), with f =
+    kr0 + kr1 r^2 + kr2 r^4 + kr3 r^6.
+
+    Parameters
+    ----------
+    coefficients : ndarray
+        kr0, kr1, kr2, kr3, kt0, kt1 of each color plane, or of all (N, 6).
+
+    Returns
+    -------
+    bytes
+        The value of the tag.
+    """
+    said = struct.pack(">L", len(coefficients))
+    said += np.ascontiguousarray(coefficients, ">f8").tobytes() + struct.pack(">2d", 0.5, 0.5)
+    opcode = struct.pack(">4L", _WARP_RECTILINEAR, _SINCE, _MAY_BE_SKIPPED, len(said)) + said
+    return struct.pack(">L", 1) + opcode

@@ -7,11 +7,13 @@ light's matrix and adapts white as Bradford has it comes to the same colors. Con
 between the two for other lights; LibRaw takes that of D65 for all.
 
 What lens and pixels keep from the light toward the corners is written as gain maps: converters that
-know them (Adobe's, darktable's) make even light even again, LibRaw leaves it as it is.
+know them (Adobe's, darktable's) make even light even again, LibRaw leaves it as it is. Distortion
+and lateral color are written as a warp (opcode WarpRectilinear).
 """
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +22,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.derived.mosaic import BLOCKS
-from vcam_cli.effects.base import Gain, of_kind
+from vcam_cli.effects.base import Gain, StillWarp, of_kind
 from vcam_cli.effects.noise.quantization import Quantization
 from vcam_cli.errors import bad
 from vcam_cli.files.images.dng import (
@@ -42,6 +44,11 @@ from vcam_cli.spectra import Spectrum, cmf, colorchecker, illuminant, pair_weigh
 RANGE = (360e-9, 830e-9)
 """Wavelengths at which color is known [m]."""
 BAYER = tuple(BLOCKS[f"bayer-{name}"] for name in ("rggb", "grbg", "gbrg", "bggr"))
+WARP_POINTS, MOST_MISSED = 33, 0.5
+"""Places along each side of the frame to which a warp is fitted, and what it may miss there at most
+[pixels]: beyond that a converter would bend straight lines visibly."""
+GREEN = 550e-9
+"""Wavelength of a lens that images all alike [m]."""
 MAP_POINTS = 65
 """Rows and columns of a gain map."""
 PREVIEW_SIZE = 1024
@@ -102,6 +109,7 @@ def write_raw_dng(path: Path, frame: Frame, description: str) -> None:
         white=round(white),
         table=table,
         baseline_exposure=float(np.log2(span / light)) if light > 0 < span else 0.0,
+        warp=_warp(frame),
         shading=_shading(frame),
         noise=_noise(frame, span),
         name=frame.solved.name,
@@ -166,6 +174,48 @@ def _shading(frame: Frame) -> Array | None:
     for effect in gains:
         share *= effect.gain(x, y) / effect.gain(axis, axis)
     return None if np.ptp(share) == 0 else 1 / np.maximum(share, 1 / LARGEST_GAIN)
+
+
+def _warp(frame: Frame) -> Array | None:
+    """Return the coefficients of WarpRectilinear, of every color where they differ.
+
+    They are fitted to where the still warps image places of a corrected frame; None where there
+    are none, or where they miss by more than `MOST_MISSED` pixels, as those of fisheyes.
+    """
+    still, g = of_kind(frame.plan.active, StillWarp), frame.layout.grid
+    if not still:
+        return None
+    corner = math.hypot(g.sensor_width, g.sensor_height) / 2
+    along = np.linspace(-0.5, 0.5, WARP_POINTS)
+    places = np.meshgrid(along * g.sensor_width, along * g.sensor_height)
+    x, y = (axis.ravel() / corner for axis in places)
+    r2 = x * x + y * y
+    radial = [r2**power for power in range(4)]
+    basis = np.concatenate(
+        [
+            np.stack([*(x * part for part in radial), 2 * x * y, r2 + 2 * x * x], axis=1),
+            np.stack([*(y * part for part in radial), r2 + 2 * y * y, 2 * x * y], axis=1),
+        ]
+    )
+    found = []
+    for wavelength in _mean_wavelengths(frame) if any(e.knots for e in still) else [GREEN]:
+        seen_x, seen_y = places
+        for effect in still:
+            seen_x, seen_y = effect.images(seen_x, seen_y, wavelength, 0.0)
+        there = np.concatenate([axis.ravel() / corner for axis in (seen_x, seen_y)])
+        fit = np.linalg.lstsq(basis, there, rcond=None)[0]
+        if np.abs(basis @ fit - there).max() * corner > MOST_MISSED * min(g.pitch_x, g.pitch_y):
+            return None
+        found.append(fit)
+    return np.array(found)
+
+
+def _mean_wavelengths(frame: Frame) -> list[float]:
+    """Return the mean wavelength of the light of R, G and B, or of a gray frame [m]."""
+    light = frame.transfer.weights.sum(axis=0)
+    colors = frame.mosaic.colors
+    order = [colors.index(name) for name in "RGB"] if len(colors) > 1 else [0]
+    return [float(light[n] @ frame.transfer.wavelengths / (light[n].sum() or 1)) for n in order]
 
 
 def _noise(frame: Frame, span: float) -> tuple[float, float]:
