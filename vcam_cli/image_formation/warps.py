@@ -17,7 +17,8 @@ Blur and the pixels' aperture are those of the image plane, so they come after t
   (`sub_exposures`). Its blur is then that of the place where light lay in the middle: it errs by
   what the lens's scale differs over the path of an exposure, and by lateral color of that path.
 - **Alone**, even motion is a transfer function and a displacement: `Warp` and `Blur` are one then.
-  With the sinc a frame of 0.15 megapixels in even motion takes 0.06 s of light, by instants 0.5 s.
+  Dead leaves on 0.15 megapixels in a pan take 0.26 s of processor time by the sinc, and 1.5 s by
+  instants.
 """
 
 from __future__ import annotations
