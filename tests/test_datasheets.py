@@ -144,7 +144,7 @@ def test_known_cameras_make_what_is_printed_of_them(name):
 
 
 def test_a_split_pixel_has_its_dynamic_range_in_one_exposure():
-    """20 log10(7900 / 0.01 / 0.83) less dark current: 119.6 dB without it; two exposures, 139 dB."""
+    """20 log10(7900 / 0.01 / 0.83) = 119.6 dB without dark current; two exposures, 139 dB."""
     size = ["array.rows=64", "array.columns=64"]
     metrics = simulate(load("split-pixel", size)).metrics
     assert metrics["hdr_dynamic_range_db"] >= 120

@@ -243,15 +243,20 @@ def prepare_bench(camera: Camera, workers: int, stages: Stages) -> Bench:
             "only pixels in blocks on rows and columns are measured",
             "write for example pattern: monochrome to measure the pixel",
         )
-    blurs = ("diffraction", "aberration")  # they do not change even light
-    even = _before_chart(camera, Uniform(kind="chart", chart="uniform"), "off_axis", *blurs)
-    ready, _ = prepare(even, workers, stages.watch)
+    ready = prepare_even(camera, workers, stages)
     bench = Bench(camera, ready, 0, workers)
     _check_measurable(bench)
     e = ready.electrical
     spread = math.sqrt(bench.noise_floor + bench.dark + bench.pattern_variance(bench.dark))
     short = PEDESTAL * spread / e.electrons_per_dn - e.offset
     return replace(bench, pedestal=max(0, math.ceil(short)))
+
+
+def prepare_even(camera: Camera, workers: int, stages: Stages) -> Prepared:
+    """Return a camera ready to take frames of even light; arguments as those of `prepare_bench`."""
+    blurs = ("diffraction", "aberration")  # they do not change even light
+    even = _before_chart(camera, Uniform(kind="chart", chart="uniform"), "off_axis", *blurs)
+    return prepare(even, workers, stages.watch)[0]
 
 
 def prepare_edge_bench(bench: Bench, stages: Stages) -> Bench:

@@ -8,15 +8,17 @@ nothing of the file. Its closed forms stand beside each number (`datasheet.py`).
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.readouts import has_several, readouts
 from vcam_cli.camera.expectations import Limit
 from vcam_cli.characterization.bench import Bench, prepare_bench
 from vcam_cli.characterization.datasheet import COLUMNS, Quantity, notes, quantities
 from vcam_cli.characterization.exposures import Channel, measure_channels
 from vcam_cli.characterization.kept_frames import Keeper
+from vcam_cli.characterization.merged_snr import MergedSnr, measure_merged_snr
 from vcam_cli.errors import BadInput
 from vcam_cli.floats import own_float_errors
 from vcam_cli.parallel import available_workers
@@ -39,6 +41,9 @@ class Characterization:
         What a reader of the numbers has to know.
     stages : Stages
         Seconds that each stage took.
+    merged : tuple of MergedSnr
+        SNR of pixels that are read several times; () of others. Their quantities are those of each
+        readout, bench and channels those of the first.
     """
 
     bench: Bench
@@ -46,6 +51,7 @@ class Characterization:
     quantities: tuple[Quantity, ...]
     notes: tuple[str, ...]
     stages: Stages
+    merged: tuple[MergedSnr, ...] = ()
 
     @property
     def nyquist(self) -> float:
@@ -82,6 +88,7 @@ class Characterization:
             "pedestal": self.bench.pedestal,
             "quantities": [dict(zip(COLUMNS, q.row, strict=True)) for q in self.quantities],
             "channels": {c.color: _measured_points(c) for c in self.channels},
+            **({"merged_snr": [point.row for point in self.merged]} if self.merged else {}),
             "notes": list(self.notes),
             "stages": self.stages.seconds,
         }
@@ -113,13 +120,45 @@ def characterize(
         With positions in the camera's file, if it cannot be measured.
     """
     try:
-        stages = Stages(watch=watch or Silent())
-        bench = prepare_bench(camera, workers or available_workers(), stages)
-        channels = measure_channels(bench, stages, keeper)
+        stages, workers = Stages(watch=watch or Silent()), workers or available_workers()
+        if has_several(camera):
+            return _of_readouts(camera, workers, stages, keeper)
+        return _of_one(camera, workers, stages, keeper)
     except BadInput as error:
         raise error.with_places(camera.locate) from None
+
+
+def _of_one(
+    camera: Camera, workers: int, stages: Stages, keeper: Keeper | None
+) -> Characterization:
+    bench = prepare_bench(camera, workers, stages)
+    channels = measure_channels(bench, stages, keeper)
     numbers = tuple(q for channel in channels for q in quantities(bench, channel))
     return Characterization(bench, channels, numbers, tuple(notes(bench, channels)), stages)
+
+
+def _of_readouts(
+    camera: Camera, workers: int, stages: Stages, keeper: Keeper | None
+) -> Characterization:
+    """Measure each readout of a camera as if it were alone, and the SNR of their merge."""
+    each = readouts(camera)
+    parts = [
+        _of_one(readout.camera, workers, stages, keeper if number == 0 else None)
+        for number, readout in enumerate(each)
+    ]
+    numbers = tuple(
+        replace(q, channel=f"{readout.name} {q.channel}")
+        for readout, part in zip(each, parts, strict=True)
+        for q in part.quantities
+    )
+    names = ", ".join(readout.name for readout in each)
+    told = [f"every readout is measured as if it were alone ({names}); plots show {each[0].name}"]
+    if camera.pixel.readout.small is not None:
+        told.append("small: photons are those that its photodiode gets of the light")
+    for readout, part in zip(each, parts, strict=True):
+        told += [f"{readout.name}: {note}" for note in part.notes]
+    merged = measure_merged_snr(camera, workers, stages)
+    return replace(parts[0], quantities=numbers, notes=tuple(told), merged=merged)
 
 
 def _measured_points(channel: Channel) -> dict[str, Any]:

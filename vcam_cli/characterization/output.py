@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any
 
 from vcam_cli.camera.camera import Camera
+from vcam_cli.characterization import merged_snr
 from vcam_cli.characterization.characterize import Characterization
 from vcam_cli.characterization.datasheet import COLUMNS
 from vcam_cli.characterization.plots import characterization_panels
@@ -45,6 +46,9 @@ def write(
 ) -> None:
     """Write all files of a measurement; report: report.html, too; formats: of plots beside PNG."""
     tables.write_table(folder.new("characterize.csv"), COLUMNS, (q.row for q in found.quantities))
+    if found.merged:
+        rows = (point.row for point in found.merged)
+        tables.write_table(folder.new("merged_snr.csv"), merged_snr.COLUMNS, rows)
     drawn = {
         name: partial(curves.draw, title=title, panels=panels)
         for name, (title, panels) in characterization_panels(found).items()
@@ -72,6 +76,8 @@ def report_arguments(found: Characterization) -> dict[str, Any]:
         "photon_transfer.png": "Temporal variance over the mean, whose slope is the system gain K",
         "snr.png": "Signal over temporal noise over the photons on a pixel, with the model",
         "linearity.png": "Mean over photons, and the deviation from a straight line",
+        "merged_snr.png": "SNR of all readouts merged, with the model; one by one they saturate",
+        "merged_snr.csv": "SNR of all readouts merged, measured and expected.",
         "mtf.png": "Transfer of contrast of a slanted edge over spatial frequency, with the model",
     }
     about = "Measured on simulated raw frames as EMVA 1288 and ISO 12233 have it."
@@ -81,7 +87,9 @@ def report_arguments(found: Characterization) -> dict[str, Any]:
 
 def quantities_table(found: Characterization) -> tuple[list[str], list[list[str]]]:
     """Return headings and rows of the quantities: measured and expected values of every color."""
-    colors = [channel.color for channel in found.channels]
+    colors = list(dict.fromkeys(q.channel for q in found.quantities))
+    if found.merged:  # of each readout its first color: all of them are in the files
+        colors = colors[:: len(found.channels)]
     measured = ["measured"] if len(colors) == 1 else colors
     head = ["quantity", *(name for color in measured for name in (color, "expected")), "unit"]
     rows = []

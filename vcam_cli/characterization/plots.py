@@ -27,7 +27,24 @@ def characterization_panels(result: Characterization) -> dict[str, tuple[str, li
         "snr.png": (f"{name}: signal to noise", [_snr_panel(result)]),
         "linearity.png": (f"{name}: linearity", _linearity_panels(result)),
         "mtf.png": (f"{name}: system MTF at the center", [_mtf_panel(result)]),
+        **_merged_plot(result),
     }
+
+
+def _merged_plot(result: Characterization) -> dict[str, tuple[str, list[Panel]]]:
+    """Return the plot of the SNR of several readouts; none of pixels that are read once."""
+    if not result.merged:
+        return {}
+    signal, measured, expected = np.array([point.row for point in result.merged]).T
+    curves = [
+        Curve("measured", signal, 10 ** (measured / 20), "points", 0),
+        Curve("model", signal, 10 ** (expected / 20), "line", 0),
+        Curve("shot-noise limit", signal, np.sqrt(signal), "dashed", -1),
+    ]
+    panel = Panel(
+        "signal of the large photodiode [e]", "signal over temporal noise", curves, log=True
+    )
+    return {"merged_snr.png": (f"{result.bench.camera.name}: SNR of all readouts", [panel])}
 
 
 def _styled_channels(result: Characterization) -> Iterator[tuple[Channel, int, str]]:
