@@ -2,6 +2,8 @@
 
 import re
 import shlex
+import subprocess
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -45,21 +47,25 @@ def blocks(text: str) -> list[Block]:
 
 
 def commands(text: str, program: str = "vcam") -> list[str]:
-    """The commands of a program that a document shows."""
+    """The commands of a program, a regular expression, that a document shows."""
     lines = [x for b in blocks(text) if b.language == "console" for x in b.text.splitlines()]
-    return [line.removeprefix("$ ") for line in lines if line.startswith(f"$ {program} ")]
+    return [line.removeprefix("$ ") for line in lines if re.match(rf"\$ {program} ", line)]
 
 
 def run(text: str) -> None:
     """Write the files that a document gives, and run its commands, in the current folder.
 
-    Each must end well; those of `MINUTES` are left out.
+    Each must end well; those of `MINUTES` are left out. Scripts are those that the document gives.
     """
-    for block in blocks(text):
-        if block.title:
-            Path(block.title).write_text(block.text, encoding="utf-8")
-    for command in commands(text):
-        words = shlex.split(command.partition("  #")[0])[1:]
+    given = [block for block in blocks(text) if block.title]
+    for block in given:
+        Path(block.title).write_text(block.text, encoding="utf-8")
+    for command in commands(text, "(?:vcam|python)"):
+        program, *words = shlex.split(command.partition("  #")[0])
+        if program == "python":
+            if words[0] in [block.title for block in given]:
+                subprocess.run([sys.executable, *words], check=True)
+            continue
         if any(words[: len(start)] == start for start in MINUTES):
             continue
         done = CliRunner().invoke(app, words)
