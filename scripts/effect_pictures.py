@@ -142,6 +142,16 @@ EXAMPLES = {
         ),
         "A lamp that flickers at 100 Hz, rows read 0.2 ms apart.",
     ),
+    "crosstalk": Example(
+        (
+            *_chart("colorchecker"),
+            "pixel.crosstalk={optical: 4 %, electrical: {table: {450: 1 %, 650: 5 %}}}",
+            "processing=[{black_level: subtract}, {demosaic: bilinear},"
+            " {white_balance: illuminant}, {gamma: srgb}]",
+        ),
+        "Neighbors of other colors get up to a third of a pixel's light: colors fade, if no color"
+        " correction undoes it.",
+    ),
     "dark_current": Example(
         (
             *_chart("step-wedge"),

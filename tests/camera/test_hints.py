@@ -315,11 +315,8 @@ def test_what_is_not_simulated_is_said(word):
 
 @pytest.mark.parametrize(
     "guess",
-    [
-        "pixel.readout.blooming=5 %", "array.crosstalk=1 %", "effects.crosstalk=on",
-        "pixel.photodetector.optical_crosstalk=1 %",
-    ],
-)  # fmt: skip
+    ["pixel.readout.blooming=5 %", "array.blooming=5 %", "effects.blooming=on"],
+)
 def test_what_is_not_simulated_is_said_wherever_it_is_looked_for(guess):
     assert "not simulated" in remedy_of(guess)[0]
 

@@ -22,6 +22,7 @@ from vcam_cli.camera.simulation import EFFECTS
 from vcam_cli.effects.base import (
     Charge,
     Gain,
+    NeighborSharing,
     RadialTransfer,
     SeparableTransfer,
     SignalLevels,
@@ -33,6 +34,7 @@ from vcam_cli.effects.base import (
 from vcam_cli.effects.optics.depth import Depth
 from vcam_cli.effects.order import ORDER
 from vcam_cli.effects.signal_chain import Limit, NoiseSource, Quantizer, Site
+from vcam_cli.image_formation.neighbor_sharing import spread
 from vcam_cli.rng import BLOCK_ROWS, stream
 
 # Twenty whole periods on the 64 columns of 5 um, so that its rms is that of a whole wave.
@@ -122,6 +124,11 @@ CASES: dict[str, Case] = {
             },
             "exposure": {"time": "4 ms", "shutter": {"rolling": {"line_time": "100 us"}}},
         },
+    ),
+    "crosstalk": Case(
+        {"pixel.crosstalk": {"optical": "1 %", "electrical": "0.5 %"}},
+        {"pixel.crosstalk": {"optical": "0 %"}},
+        {"scene.source": WAVE},
     ),
     "dark_current": Case(
         {"pixel.photodetector.dark_current": "5 ke/s"},
@@ -544,6 +551,10 @@ def test_finite_on_hostile_input(kind, dtype, tmp_path):
     elif isinstance(effect, VeilingGlare):
         results = [np.array(effect.fraction)]
         assert 0 < effect.fraction <= 1
+    elif isinstance(effect, NeighborSharing):
+        signal = np.array([[-1e9, 0], [1e-30, 0.5], [1e6, 1e12]], dtype)
+        kernels = [np.array(k.points[0][1])[None] for k in effect.before]
+        results = [spread(signal, kernel, np.zeros((1, 1), int)) for kernel in kernels]
     elif isinstance(effect, Transport):
         results = [effect.transport(np.array([[-1e9, 0], [1e-30, 0.5], [1e6, 1e12]], dtype))]
     else:

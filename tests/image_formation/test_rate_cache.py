@@ -33,6 +33,7 @@ CHANGES = {
     "display.viewing_distance": "20 in",
     "pixel.fpn": {"offset_pixel": "3 e"},
     "pixel.defects": {"hot": 0.01, "dead": 0.01},
+    "pixel.crosstalk": {"optical": "1 %"},
     "pixel.readout.gain": 2,
     "pixel.readout.read_noise": "9 e",
     "pixel.readout.column_noise": "9 e",

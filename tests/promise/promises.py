@@ -261,6 +261,17 @@ pixel:
 array: {rows: 60, columns: 80, pattern: bayer-rggb}
 exposure: {auto: {max: 100 ms}}
 """,
+    "crosstalk": """
+scene: {source: {kind: chart, chart: colorchecker}}
+pixel:
+  readout: {read_noise: 3 e}
+  crosstalk:
+    optical: {table: {450: 0.3 %, 650: 0.8 %}}
+    electrical: 0.5 %
+    interpixel_capacitance: 0.4 %
+array: {rows: 60, columns: 80, pattern: bayer-rggb}
+exposure: {auto: {max: 100 ms}}
+""",
     "defective": """
 scene: {source: {kind: chart, chart: slanted-edge}}
 pixel:

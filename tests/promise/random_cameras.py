@@ -88,6 +88,7 @@ def tree(number: int) -> dict:
             "architecture": "ccd" if ccd else "aps-3t",
             "width": spread(1.5, 10, "um"),
             "stack": stack,
+            "crosstalk": {"optical": spread(0.01, 2, "%"), "electrical": spread(0.01, 2, "%")},
             "microlens": {"gain": share(1.1, 1.8), "shift": "optimal"},
             "photodetector": {
                 "fill_factor": share(0.25, 0.55),

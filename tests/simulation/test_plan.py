@@ -92,6 +92,7 @@ CAMERAS = {
         "adc.noise": "1 DN",
         "pixel.fpn": {"dark": "20 %", "shading": {"offset": "20 e", "gain": "1 %"}},
         "pixel.defects": {"hot": 0.01, "dead": 0.02},
+        "pixel.crosstalk": {"optical": "0.5 %", "interpixel_capacitance": "0.4 %"},
         "pixel.microlens": {"gain": 1.5},
         "pixel.stack": {
             "passivation": {"thickness": "0.7 um", "index": 2.0},

@@ -81,6 +81,11 @@ KEYS: Mapping[str, str] = {
     "saturation_capacity": "pixel.readout.full_well: 20 ke",
     "cte": "pixel.readout.charge_transfer: {inefficiency: 3e-5, phases: 3}",
     "cti": "pixel.readout.charge_transfer: {inefficiency: 3e-5, phases: 3}",
+    **dict.fromkeys(("crosstalk", "optical_crosstalk"), "pixel.crosstalk: {optical: 1 %}"),
+    "electrical_crosstalk": "pixel.crosstalk: {electrical: 0.5 %}",
+    **dict.fromkeys(
+        ("ipc", "interpixel_capacitance"), "pixel.crosstalk: {interpixel_capacitance: 0.5 %}"
+    ),
     "hot_pixels": "pixel.defects.hot: 0.0001",
     "dead_pixels": "pixel.defects.dead: 0.0001",
     **dict.fromkeys(
@@ -323,10 +328,6 @@ NOT_SIMULATED: Mapping[str, str] = {
         "charge beyond the full well is drained, and spills to no neighbor",
     ),
     "smear": "charge is transferred in no time, and collects no light meanwhile",
-    **dict.fromkeys(
-        ("crosstalk", "optical_crosstalk", "electrical_crosstalk"),
-        "pixels share light and charge by pixel.photodetector.charge_diffusion alone",
-    ),
     **dict.fromkeys(
         ("prescription", "zemax"),
         "a lens is given by what it does, in optics.zernike, optics.psf or optics.mtf",

@@ -110,6 +110,7 @@ class CameraModel(FileModel):
             *light_mistakes(self.processing, self.scene.emits),
             *code_mistakes(self.processing, render),
             *self._capture_mistakes(),
+            *self._crosstalk_mistakes(),
             *unmeasured_mistakes(
                 self.expect, self.quality, self.has_edge, self.exposure.has_samples
             ),
@@ -148,6 +149,31 @@ class CameraModel(FileModel):
             message = f"pixels joined by {binning.kind} binning are read once in an integration"
             remedy = "write kind: charge in array.binning, or give one exposure time"
             yield fault(place, message, remedy)
+
+    def _crosstalk_mistakes(self) -> Iterator[InitErrorDetails]:
+        """Yield why the crosstalk of these pixels cannot be simulated."""
+        given, readout = self.pixel.crosstalk, self.pixel.readout
+        if given is None:
+            return
+        path = ("pixel", "crosstalk")
+        if self.array.is_scattered:
+            message = "crosstalk is simulated between pixels in rows and columns"
+            yield fault(path, message, "write another array.pattern, or crosstalk: none")
+        if given.interpixel_capacitance is None:
+            return
+        several = bool(readout.gains) or readout.small is not None
+        for refused, what, remedy in (
+            (
+                self.array.summed_charges > 1,
+                "joined charges",
+                "write kind: digital in array.binning",
+            ),
+            (self.exposure.captures, "several captures of one integration", "give one time"),
+            (several, "several readouts of one exposure", "remove readout.gains and readout.small"),
+        ):
+            if refused:
+                message = f"is not simulated with {what}"
+                yield fault((*path, "interpixel_capacitance"), message, f"{remedy}, or remove it")
 
     @property
     def has_edge(self) -> bool:

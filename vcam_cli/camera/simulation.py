@@ -24,6 +24,7 @@ EFFECTS = {
     "charge_diffusion": "blur by charge that diffuses in the silicon",
     "pixel_vignetting": "shading by the layers above the photodetector",
     "microlens": "a lens on every pixel",
+    "crosstalk": "light, charge and voltage that pixels give to their neighbors",
     "flicker": "a lamp that is not equally bright at all times",
     "dark_current": "electrons that heat makes",
     "shot_noise": "light and dark current arrive one by one",

@@ -13,6 +13,7 @@ kind says in mathematics what it does, and so where in the order it acts (`order
     Gain               multiplies the signal, pixel by pixel                    no unit
     VeilingGlare       spreads part of the light over the whole sensor          no unit
     TemporalGain       multiplies the signal by the light of each line's time   no unit
+    NeighborSharing    gives part of a pixel's signal to its neighbors          no unit
     Charge             adds electrons                                           electrons
     Transport          moves charge to later pixels on its way out              no unit
     NoiseSource        adds randomness, of known variance                       electrons
@@ -41,6 +42,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.image_motion import ExposedMotion
 from vcam_cli.camera.sensor.array import Binning
+from vcam_cli.camera.sensor.crosstalk import Kernel, Kernels
 
 Kind = TypeVar("Kind", bound="Effect")
 PLACES = 3
@@ -582,6 +584,18 @@ class TemporalGain(Effect):
         Its shape at the positions x (columns,), y (rows,) [m] is (rows or 1, columns or 1): 1
         where it is the same along that axis. Its mean over all times is 1.
         """
+
+
+class NeighborSharing(Effect):
+    """Shares of a pixel's signal that its neighbors get: before it is counted, and after."""
+
+    acts_on_light = False
+    before: tuple[Kernels, ...]
+    """Of light and charge before it is counted, one after the other: electrons stay independent."""
+    after: Kernel | None
+    """Of the charge that is counted: neighbors show the same noise."""
+    largest_share: float
+    """Largest share of a pixel's signal that it gives away."""
 
 
 class Charge(Effect):

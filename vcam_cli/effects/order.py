@@ -13,6 +13,7 @@
     electrons / s          VeilingGlare       stray_light                    electrons / s
     electrons / s          Gain               pixel_vignetting, microlens    electrons / s
     electrons / s          TemporalGain       flicker                        electrons / s
+    electrons / s          NeighborSharing    crosstalk                      electrons / s
     electrons / s          Charge             dark_current                   electrons (mean signal)
     electrons              Transport          charge_transfer                electrons (mean signal)
     electrons              before_shot        fpn                            electrons (mean signal)
@@ -27,10 +28,10 @@
 
 Kinds are classes of `base.py` and `signal_chain.py`; an aberration that changes over the field is a
 FieldTransfer; `before_shot` is a method of a NoiseSource: it changes the mean signal whose shot
-noise is drawn. Warps are composed in their order, from the scene to the sensor; where nothing else
-warps, motion may be a transfer function. Transfer functions multiply, so their order does not
-matter. Gains act on the blurred image: they are taken as constant over a pixel and a point spread
-function.
+noise is drawn. Crosstalk has a part that acts behind shot_noise: it couples sense nodes. Warps are
+composed in their order, from the scene to the sensor; where nothing else warps, motion may be a
+transfer function. Transfer functions multiply, so their order does not matter. Gains act on the
+blurred image: they are taken as constant over a pixel and a point spread function.
 
 Within a kind the order of this tuple is the order of action; that of the noise in front of the ADC,
 which an automatic offset makes room for, is in `noise/sources.py`. It is written nowhere else.
@@ -51,6 +52,7 @@ from vcam_cli.effects.optics.off_axis import OffAxis
 from vcam_cli.effects.optics.stray_light import StrayLight
 from vcam_cli.effects.pixel.charge_diffusion import ChargeDiffusion
 from vcam_cli.effects.pixel.charge_transfer import ChargeTransfer
+from vcam_cli.effects.pixel.crosstalk import Crosstalk
 from vcam_cli.effects.pixel.dark_current import DarkCurrent
 from vcam_cli.effects.pixel.microlens import Microlens
 from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
@@ -73,6 +75,7 @@ ORDER: tuple[type[Effect], ...] = (
     PixelVignetting,
     Microlens,
     Flicker,
+    Crosstalk,
     DarkCurrent,
     ChargeTransfer,
     *SOURCES,

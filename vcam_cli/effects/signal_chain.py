@@ -93,6 +93,8 @@ class ElectronEffect(Effect):
     """In several samples of one integration: drawn anew in each, the same in all, or drawn anew
     for the charge of each step, which adds up."""
 
+    in_charge: ClassVar[bool] = False
+    """Whether it is noise of the charge itself, in front of what couples sense nodes."""
     behind_well: ClassVar[bool] = False
     """Whether it acts on what full pixels hold at most, behind the clamp."""
 

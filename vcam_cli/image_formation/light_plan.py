@@ -21,6 +21,7 @@ from vcam_cli.effects.base import (
     Effect,
     FieldTransfer,
     Gain,
+    NeighborSharing,
     SeparableTransfer,
     SignalLevels,
     StillWarp,
@@ -51,7 +52,7 @@ PLACES = 33
 """Places along each side of the array at which a gain, which is smooth, is looked at."""
 BLURS = (Blur, SeparableTransfer, FieldTransfer, Warp)
 """Kinds of effects that blur the light, or displace it."""
-KINDS = (*BLURS, Gain, VeilingGlare, Transport)
+KINDS = (*BLURS, Gain, VeilingGlare, NeighborSharing, Transport)
 """Kinds of effects on the light, and on the charge that it makes."""
 EXACT = 10e-3
 """Time that exact sums take of what a blur changes of edges [s]: one that saves less is kept
@@ -190,7 +191,7 @@ def _blur_shares(cost: LightCost, budget: float) -> dict[Effect, float]:
 
 
 def _share(path: OpticalPath, scene: AnyScene, effect: Effect) -> float:
-    """Return a bound on what a gain, glare or transport changes; inf for none."""
+    """Return a bound on what a gain, glare, sharing or transport changes; inf for none."""
     share = effect.mean_error(SignalLevels(full_signal=1.0, time=1.0))
     share = math.inf if share is None else share
     allowed = LEVEL_SHARE * path.settings.tolerance
@@ -198,11 +199,16 @@ def _share(path: OpticalPath, scene: AnyScene, effect: Effect) -> float:
         low, high = _range_of_gains(path, (gain,))
         if max(abs(1 - low), abs(1 - high)) > allowed:  # of some pixel's light
             return math.inf
-    for glare in of_kind([effect], VeilingGlare):
+    spread = [glare.fraction for glare in of_kind([effect], VeilingGlare)]
+    shared = of_kind([effect], NeighborSharing)
+    if shared and len(path.mosaic.colors) > 1:  # of even light, too, each color changes others
+        return math.inf
+    spread += [sharing.largest_share for sharing in shared]
+    for fraction in spread:
         before = path.effects[: path.effects.index(effect)]
         low, high = _range_of_gains(path, of_kind(before, Gain))
         darkest, brightest = _range_of_light(scene)
-        least, moved = low * darkest, glare.fraction * (high * brightest - low * darkest)
+        least, moved = low * darkest, fraction * (high * brightest - low * darkest)
         share = 0.0 if moved == 0 else moved / least if least > 0 else math.inf
         if share > allowed:  # of the darkest pixel's light
             return math.inf

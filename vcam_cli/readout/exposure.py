@@ -6,7 +6,7 @@ draw has its own stream per block, so the frame does not depend on the number of
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -14,7 +14,13 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.effects.base import Charge, Effect, of_kind
-from vcam_cli.effects.signal_chain import NoiseSource, Quantizer, Site, electron_effects
+from vcam_cli.effects.signal_chain import (
+    NoiseSource,
+    Quantizer,
+    Site,
+    electron_effects,
+    full_well,
+)
 from vcam_cli.parallel import each, slices_within
 from vcam_cli.rng import BLOCK_ROWS, blocks, stream
 
@@ -161,6 +167,7 @@ def capture(
     coarse_normals: bool = False,
     full_charge: Array | None = None,
     pedestal: Array | None = None,
+    couple: Callable[[Array], Array] | None = None,
 ) -> tuple[Array, Array]:
     """Return one frame of an array whose rate of electrons is known.
 
@@ -190,6 +197,8 @@ def capture(
         the full well [electrons].
     pedestal : Array, optional
         What the ADC adds to each pixel beside its offset (rows, columns) [electrons].
+    couple : callable, optional
+        What sense nodes show of the charges of the whole array, in its shape [electrons].
 
     Returns
     -------
@@ -206,7 +215,10 @@ def capture(
     if rate.ndim == 3:
         full = [None] * len(rate) if full_charge is None else full_charge
         layers = [
-            capture(plane, time, effects, adc, seeds, workers, None, number, coarse_normals, most)
+            capture(
+                *(plane, time, effects, adc, seeds, workers, None, number, coarse_normals, most),
+                couple=couple,
+            )
             for number, (plane, most) in enumerate(zip(rate, full, strict=True))
         ]
         return np.array([e for e, _ in layers]), np.array([dn for _, dn in layers])
@@ -214,15 +226,24 @@ def capture(
     electrons = np.empty_like(rate)
     dn = np.empty(rate.shape, codes_type(adc.bits))
 
+    in_front = electron_effects(effects, behind_well=False)
+    coupled = (
+        None
+        if couple is None
+        else couple(_charges(rate, time, effects, seeds, workers, layer, coarse_normals))
+    )
+    if coupled is not None:
+        in_front = tuple(effect for effect in in_front if not effect.in_charge)
+
     def shoot(block: slice) -> None:
         opened = sites(rate, dark, seeds, layer, block, coarse_normals=coarse_normals)
         for rows in slices_within(block, max(1, AT_ONCE // rate.shape[1])):
-            tile = mean_electrons(rate[rows], time, effects)
-            place = {"rows": len(tile), "first_row": rows.start}
-            here = {scope: replace(site, **place) for scope, site in opened.items()}
-            for source in of_kind(effects, NoiseSource):
-                tile = source.before_shot(tile, here[source.scope])
-            for effect in electron_effects(effects, behind_well=False):
+            here = _at_rows(opened, rows)
+            if coupled is None:
+                tile = _mean_charge(rate[rows], time, effects, here)
+            else:
+                tile = coupled[rows]
+            for effect in in_front:
                 tile = effect.apply(tile, here[effect.scope])
             if full_charge is not None:
                 np.minimum(tile, full_charge[rows], out=tile)
@@ -235,3 +256,46 @@ def capture(
 
     each(shoot, blocks(len(rate)), workers)
     return electrons, dn
+
+
+def _at_rows(opened: Mapping[str, Site], rows: slice) -> dict[str, Site]:
+    """Return the sites of a block for some of its rows."""
+    place = {"rows": rows.stop - rows.start, "first_row": rows.start}
+    return {scope: replace(site, **place) for scope, site in opened.items()}
+
+
+def _mean_charge(
+    rate: Array, time: float, effects: tuple[Effect, ...], here: Mapping[str, Site]
+) -> Array:
+    """Return the mean signal whose shot noise is drawn, of some rows [electrons]."""
+    tile = mean_electrons(rate, time, effects)
+    for source in of_kind(effects, NoiseSource):
+        tile = source.before_shot(tile, here[source.scope])
+    return tile
+
+
+def _charges(
+    rate: Array,
+    time: float,
+    effects: tuple[Effect, ...],
+    seeds: dict[str, int],
+    workers: int,
+    layer: int,
+    coarse_normals: bool,
+) -> Array:
+    """Return the charges of all pixels with their noise, as their wells hold them [electrons]."""
+    dark, out = mean_dark(time, effects), np.empty_like(rate)
+    in_charge = [e for e in electron_effects(effects, behind_well=False) if e.in_charge]
+    well = rate.dtype.type(full_well(effects))
+
+    def collect(block: slice) -> None:
+        opened = sites(rate, dark, seeds, layer, block, coarse_normals=coarse_normals)
+        for rows in slices_within(block, max(1, AT_ONCE // rate.shape[1])):
+            here = _at_rows(opened, rows)
+            tile = _mean_charge(rate[rows], time, effects, here)
+            for effect in in_charge:
+                tile = effect.apply(tile, here[effect.scope])
+            np.minimum(tile, well, out=out[rows])
+
+    each(collect, blocks(len(rate)), workers)
+    return out

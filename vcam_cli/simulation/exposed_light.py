@@ -14,6 +14,7 @@ from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.effects.base import (
     Effect,
     ImageMotion,
+    NeighborSharing,
     SignalLevels,
     TemporalGain,
     Transport,
@@ -23,6 +24,7 @@ from vcam_cli.effects.signal_chain import Limit, NoiseSource, extreme_signal
 from vcam_cli.floats import rms
 from vcam_cli.image_formation import photon_rate, pixelwise, timed_gains
 from vcam_cli.image_formation.light_plan import PERCENTILES, LightPlan
+from vcam_cli.image_formation.neighbor_sharing import Sharing, array_sharing
 from vcam_cli.readout import auto_exposure, exposure, sample_times
 from vcam_cli.readout.binning import BinningGroups
 from vcam_cli.readout.layout import Layout
@@ -54,6 +56,8 @@ class ExposedLight:
     """As `Prepared.full_charge`."""
     white_rate: Array
     """As `Prepared.white_rate`."""
+    sharing: Sharing | None
+    """As `Prepared.sharing`."""
     effects: tuple[Effect, ...]
     """Effects that act before electrons are counted and are not left out of the light."""
 
@@ -77,11 +81,18 @@ def expose(seen: SceneLight, light: photon_rate.Rate) -> ExposedLight:
     layout, circuit, enabled = solved.layout, solved.electrical, solved.effects.enabled
     effects = tuple(effect for effect in path.effects if effect not in light.plan.omitted)
     groups = layout.binning_groups
+    sharing = array_sharing(
+        *(of_kind(effects, NeighborSharing), solved.response, seen.scene.white),
+        *(layout.mosaic, layout.planes),
+    )
     white_rate = seen.white_rate * groups.summed_charges / (light.plan.on_axis or 1.0)
+    if sharing is not None:
+        white_rate = sharing.matrix @ white_rate
     white = float(white_rate.max())
     dark = exposure.mean_dark(1.0, enabled)
     pixel_dark = dark / groups.summed_charges
-    collected = layout.select_pixels(light.values)
+    made = layout.select_pixels(light.values)
+    collected = made if sharing is None else sharing.arriving(made)
     rate = groups.collect(_transported(collected, pixel_dark, effects))
     asked = solved.exposure
     times = sample_times.choose_sample_times(asked, rate, solved.chain)
@@ -99,7 +110,10 @@ def expose(seen: SceneLight, light: photon_rate.Rate) -> ExposedLight:
     def select(values: Array, start: float, stop: float) -> Array:
         if timed:
             values = timed_gains.apply(values, timed, layout.lattice, start, stop)
-        return collected if values is light.values else layout.select_pixels(values)
+        if values is light.values:
+            return collected
+        selected = layout.select_pixels(values)
+        return selected if sharing is None else sharing.arriving(selected)
 
     def collect(values: Array, start: float, stop: float) -> Array:
         lit = select(values, start, stop)
@@ -123,6 +137,9 @@ def expose(seen: SceneLight, light: photon_rate.Rate) -> ExposedLight:
         others = tuple(e for e in timed if e is not effect)
         without = timed_gains.apply(light.values, others, layout.lattice, 0.0, time)
         changes[effect.name] = rms(np.subtract(lit, without))
+    if sharing is not None:
+        [shared] = of_kind(effects, NeighborSharing)
+        changes[shared.name] = rms(np.subtract(sharing.coupled(collected), made))
     if transports := [transport.name for transport in of_kind(enabled, Transport)]:
         well = min(circuit.full_well / time - dark, MOST_ELECTRONS)
         most = well if full_charge is None else full_charge / time - dark
@@ -141,6 +158,7 @@ def expose(seen: SceneLight, light: photon_rate.Rate) -> ExposedLight:
     return ExposedLight(
         *(rate, times, signal, chosen, changes, light_plan, step_rates, full_charge),
         white_rate=white_rate,
+        sharing=sharing,
         effects=effects,
     )
 

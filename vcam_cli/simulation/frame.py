@@ -93,6 +93,8 @@ class Frame(Prepared):
     def mean_electrons(self) -> Array:
         """Noise-free signal before saturation, photo and dark, (rows, columns) [electrons]."""
         mean = exposure.mean_electrons(self.rate, self.exposure_time, self.plan.active)
+        if self.sharing is not None:
+            mean = self.sharing.coupled(mean)
         return self.layout.binning_groups.join(mean)
 
     @property
@@ -129,7 +131,11 @@ class Frame(Prepared):
         if band is not None:
             response = replace(response, start=band[0], stop=band[1])
         levels = axis_levels(response, spectra, of_kind(self.plan.active, Gain))
-        return np.asarray(levels.T * self.layout.binning_groups.signal_ratio)
+        return self._mixed(levels.T) * self.layout.binning_groups.signal_ratio
+
+    def _mixed(self, levels: Array) -> Array:
+        """Return the signals of colors (C, ...) as crosstalk mixes them, in their unit."""
+        return levels if self.sharing is None else np.asarray(self.sharing.matrix @ levels)
 
     @property
     def clean_dn(self) -> Array:
@@ -168,7 +174,8 @@ class Frame(Prepared):
         Where the processing leaves the readout's curve in, it is straight from black to white.
         """
         layout = self.layout
-        level = self.transfer.level.T * self.exposure_time * layout.binning_groups.signal_ratio
+        level = self._mixed(self.transfer.level.T)
+        level = level * self.exposure_time * layout.binning_groups.signal_ratio
         photo = self._ideal_light(layout.picture_x, layout.picture_y, level)
         if self.electrical.curve is not None and not self.electrical.curve.corrected:
             white = self.white_rate * self.exposure_time * self.chain.summed_codes
@@ -212,6 +219,7 @@ def take_frame(ready: Prepared, workers: int, stages: Stages | None = None) -> F
                 workers=workers,
                 coarse_normals=coarse,
                 pedestal=_pedestal(ready),
+                couple=ready.couple,
             )
             groups, time = ready.layout.binning_groups, ready.exposure_time
             electrons, dn = binned_readout.read(

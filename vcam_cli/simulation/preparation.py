@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -15,6 +16,7 @@ from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.effects.base import ImageMotion, of_kind
 from vcam_cli.effects.signal_chain import Limit, full_well
 from vcam_cli.image_formation import photon_rate
+from vcam_cli.image_formation.neighbor_sharing import Sharing
 from vcam_cli.image_formation.optical_path import SpectrumReport
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.transfer_functions import Transfer
@@ -62,6 +64,8 @@ class Prepared:
     full_charge: Array | None
     """Electrons that every node is read with if it is full, in the shape of `rate`, where transfer
     defers some of them [electrons]; None elsewhere: all of the full well."""
+    sharing: Sharing | None
+    """What pixels give to their neighbors; None where they give nothing."""
 
     @property
     def camera(self) -> Camera:
@@ -110,7 +114,14 @@ class Prepared:
         if self.full_charge is not None:
             mean = np.minimum(mean, self.full_charge)
         clipped: Array = np.minimum(mean, mean.dtype.type(full_well(self.plan.active)))
-        return clipped
+        return clipped if self.sharing is None else self.sharing.coupled(clipped)
+
+    @property
+    def couple(self) -> Callable[[Array], Array] | None:
+        """What sense nodes show of charges [electrons]; None where they do not couple."""
+        if self.sharing is None or self.sharing.after is None:
+            return None
+        return self.sharing.coupled
 
     @property
     def dark_rate(self) -> float:
@@ -168,6 +179,7 @@ def plan_frame(
         plan=decided,
         step_rates=exposed.step_rates,
         full_charge=exposed.full_charge if of_kind(decided.active, Limit) else None,
+        sharing=exposed.sharing,
     )
 
 

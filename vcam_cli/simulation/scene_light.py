@@ -8,7 +8,14 @@ from functools import partial
 
 from vcam_cli import memory
 from vcam_cli.arrays import Array
-from vcam_cli.effects.base import Effect, ImageMotion, TemporalGain, Transport, of_kind
+from vcam_cli.effects.base import (
+    Effect,
+    ImageMotion,
+    NeighborSharing,
+    TemporalGain,
+    Transport,
+    of_kind,
+)
 from vcam_cli.effects.signal_chain import SIGMAS, NoiseSource, full_well
 from vcam_cli.errors import bad
 from vcam_cli.image_formation import photon_rate
@@ -184,8 +191,10 @@ def _fullness(solved: Solved, scene: AnyScene, white_rate: float) -> float:
     """
     time, enabled = solved.exposure.time, solved.effects.enabled
     well = full_well(enabled)
-    # Of full packets that are transferred, too, some charge is late.
-    joined = solved.binning is not None or of_kind(enabled, TemporalGain, Transport)
+    # Of full packets that are transferred, too, some charge is late; and the least light of the
+    # color with least of it is not that of pixels that share it.
+    shared = of_kind(enabled, TemporalGain, NeighborSharing, Transport)
+    joined = solved.binning is not None or shared
     if time is None or joined or math.isinf(well) or not isinstance(scene, ChartScene | WaveScene):
         return 0.0
     darkest = scene.chart.darkest if isinstance(scene, ChartScene) else scene.darkest

@@ -31,9 +31,10 @@ from vcam_cli.camera.sensor.adc import Adc
 from vcam_cli.camera.sensor.array import Binning
 from vcam_cli.camera.sensor.pixel import Pixel
 from vcam_cli.camera.simulation import Output, Seed
-from vcam_cli.effects.base import Gain, of_kind
+from vcam_cli.effects.base import Gain, NeighborSharing, of_kind
 from vcam_cli.effects.readout_chain import dark_noise, electrical
 from vcam_cli.effects.signal_chain import Quantizer
+from vcam_cli.image_formation.neighbor_sharing import array_sharing
 from vcam_cli.image_formation.pixel_response import PixelResponse
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.readout.chain import ReadoutChain
@@ -231,7 +232,12 @@ class Solved:
         """
         gains = of_kind(self.effects.enabled, Gain)
         lens = self.optics.transmittance.resolve()
-        return iso_speed.electrons_per_exposure(self.response, lens, gains, light)
+        found = iso_speed.electrons_per_exposure(self.response, lens, gains, light)
+        sharing = array_sharing(
+            *(of_kind(self.effects.enabled, NeighborSharing), self.response, light),
+            *(self.layout.mosaic, self.layout.planes),
+        )
+        return found if sharing is None else sharing.matrix @ found
 
     # --- the same camera with other values -----------------------------------------------------
 

@@ -7,6 +7,7 @@ from pydantic import AliasChoices, model_validator
 from pydantic_core import InitErrorDetails
 
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES, article
+from vcam_cli.camera.sensor.crosstalk import Crosstalk
 from vcam_cli.camera.sensor.noise import (
     CorrelatedRowNoise,
     HeavyTailedNoise,
@@ -354,6 +355,9 @@ class Pixel(Model):
     )
     microlens: Annotated[Microlens | None, word_or(Microlens, {"none": None})] = key(
         "a lens on every pixel", example="none", default=None
+    )
+    crosstalk: Annotated[Crosstalk | None, word_or(Crosstalk, {"none": None})] = key(
+        "what a pixel gives to its neighbors", example="none", default=None
     )
     temperature: SiliconTemperature = key(
         "of the sensor: kTC noise follows it, and dark current that is given at a temperature of"
