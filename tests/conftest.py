@@ -1,10 +1,13 @@
 """Settings all tests share: hypothesis tries the same examples on every machine.
 
-The tests run in as many processes as there are cores: threads of BLAS would only compete.
+The tests run in as many processes as there are cores: threads of BLAS would only compete. No test
+gets light that another one has brought.
 """
 
 import os
+import sys
 
+import pytest
 from hypothesis import settings
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -12,3 +15,10 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 settings.register_profile("vcam", derandomize=True, database=None, deadline=None)
 settings.load_profile("vcam")
+
+
+@pytest.fixture(autouse=True)
+def nothing_kept():
+    """Forget the light of the last simulations, where any were made."""
+    if module := sys.modules.get("vcam_cli.simulation.shared"):
+        module.RECENT.clear()

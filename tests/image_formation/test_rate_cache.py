@@ -4,9 +4,14 @@ import numpy as np
 import pytest
 from making import camera
 
-from vcam_cli import simulate
+from vcam_cli import plan, simulate
+from vcam_cli.files.images.png import write_png
+from vcam_cli.image_formation.light_plan import LightPlan
+from vcam_cli.image_formation.optical_path import SpectrumReport
+from vcam_cli.image_formation.photon_rate import Rate
+from vcam_cli.image_formation.rate_cache import RateCache
 from vcam_cli.simulation import scene_light
-from vcam_cli.simulation.shared import Shared
+from vcam_cli.simulation.shared import KEPT, RECENT, Shared
 from vcam_cli.solve.light_key import INDEPENDENT_KEYS, light_key
 
 BASE = {
@@ -87,7 +92,7 @@ def test_the_light_does_not_depend_on_it(tmp_path, path, monkeypatch):
         scene_light.photon_rate, "photo_rate", lambda *args: found.append(true(*args)) or found[-1]
     )
     for each in (plain, made):
-        simulate(each, 1)
+        simulate(each, 1, shared=Shared())
     a, b = found
     assert a.values.tobytes() == b.values.tobytes()
     assert a.spectrum == b.spectrum
@@ -121,7 +126,7 @@ def test_shared_light_gives_the_same_bytes(tmp_path, changes):
     made = camera(tmp_path, BASE | {"quality": ["mse"]})
     simulate(made, 1, shared=shared)
     other = camera(tmp_path, BASE | {"quality": ["mse"]} | changes)
-    kept, alone = simulate(other, 1, shared=shared), simulate(other, 1)
+    kept, alone = simulate(other, 1, shared=shared), simulate(other, 1, shared=Shared())
     assert kept.dn.tobytes() == alone.dn.tobytes()
     assert kept.electrons.tobytes() == alone.electrons.tobytes()
     assert kept.metrics == alone.metrics
@@ -152,7 +157,7 @@ def test_exposures_that_do_not_fill_a_pixel_share_it(tmp_path, brought):
     shared, times, full = Shared(), [], []
     for time in ("1 ms", "10 ms", "100 ms", "10 s", "30 s"):
         made = camera(tmp_path, BASE | {"exposure": {"time": time}, "quality": ["mse"]})
-        result, alone = simulate(made, 1, shared=shared), simulate(made, 1)
+        result, alone = simulate(made, 1, shared=shared), simulate(made, 1, shared=Shared())
         assert result.electrons.tobytes() == alone.electrons.tobytes()
         full.append(bool((result.dn >= result.frame.chain.saturated_dn).any()))
         times.append(len(brought))
@@ -164,5 +169,78 @@ def test_what_an_effect_contributes_is_told_of_shared_light_too(tmp_path):
     shared = Shared()
     for time in ("1 ms", "10 s", "30 s"):  # of these pixels are full: the light is brought again
         made = camera(tmp_path, BASE | {"exposure": {"time": time}})
-        kept, alone = simulate(made, 1, shared=shared), simulate(made, 1)
+        kept, alone = simulate(made, 1, shared=shared), simulate(made, 1, shared=Shared())
         assert kept.frame.plan == alone.frame.plan
+
+
+def test_a_loop_shares_light_without_being_told(tmp_path, brought):
+    made = camera(tmp_path, BASE)
+    results = [simulate(made.with_({"exposure.time": f"{n} ms"}), 1) for n in (1, 2, 3)]
+    plan(made)
+    assert len(brought) == 1
+    alone = simulate(made.with_({"exposure.time": "3 ms"}), 1, shared=Shared())
+    assert len(brought) == 2
+    assert results[-1].electrons.tobytes() == alone.electrons.tobytes()
+    assert results[-1].metrics == alone.metrics
+
+
+def test_light_that_is_shared_cannot_be_written_into(tmp_path):
+    result = simulate(camera(tmp_path, BASE), 1)
+    with pytest.raises(ValueError, match="read-only"):
+        result.frame.rate[:] = 0
+
+
+@pytest.mark.parametrize("changed", ["picture.png", "lamp.csv"])
+def test_a_file_that_changes_is_read_again(tmp_path, changed):
+    """The picture, and a lamp's spectrum, each of which light depends on."""
+    writers = {
+        "picture.png": lambda level: write_png(
+            tmp_path / "picture.png", np.full((20, 24, 3), level, np.uint8)
+        ),
+        "lamp.csv": lambda level: (tmp_path / "lamp.csv").write_text(
+            f"wavelength,power\n300,{level}\n500,100\n800,{level}\n"
+        ),
+    }
+    for write in writers.values():
+        write(200)
+    made = camera(
+        tmp_path,
+        BASE
+        | {
+            "scene.source": {"kind": "image", "file": str(tmp_path / "picture.png")},
+            "scene.illuminant": {"file": str(tmp_path / "lamp.csv")},
+        },
+    )
+    before = simulate(made, 1)
+    writers[changed](90)
+    after, alone = simulate(made, 1), simulate(made, 1, shared=Shared())
+    assert after.electrons.tobytes() == alone.electrons.tobytes()
+    assert after.electrons.tobytes() != before.electrons.tobytes()
+
+
+def test_what_is_kept_by_default_is_bounded(tmp_path):
+    """Of lights of a fifth of the bound five are kept; of one beyond it none is."""
+    shared = RECENT.shared_with(camera(tmp_path, BASE)).rate_cache
+    for number in range(8):
+        light = Rate(np.zeros(KEPT // 5, np.uint8), LightPlan(), SpectrumReport(peak=number + 1.0))
+        shared.rate(str(number), 1.0, lambda light=light: light)
+        assert shared.nbytes == min(number + 1, 5) * (KEPT // 5)
+    strict, found = RateCache(100, strict=True), []
+    for _ in range(2):
+        light = Rate(np.zeros(101, np.uint8), LightPlan(), SpectrumReport(peak=1.0))
+        strict.rate("", 1.0, lambda light=light: found.append(light) or light)
+    assert (len(found), strict.nbytes) == (2, 0)
+
+
+def test_a_picture_beyond_the_bound_is_not_kept(tmp_path):
+    made = camera(tmp_path, BASE)
+    for size, reads in ((100, 1), (101, 2)):
+        shared, found = Shared(largest_picture=100), []
+
+        def read(size=size, found=found):
+            found.append(size)
+            return np.zeros(size, np.uint8), ()
+
+        for _ in range(2):
+            shared.picture(made, read)
+        assert len(found) == reads

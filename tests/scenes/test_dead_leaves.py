@@ -5,6 +5,7 @@ import pytest
 import scipy.ndimage
 from support import scene, view
 
+from vcam_cli.physics.cache import ByteCache
 from vcam_cli.scenes import disc_edges, discs
 from vcam_cli.scenes.base import Frame
 from vcam_cli.scenes.build import build
@@ -168,3 +169,38 @@ def test_the_power_spectrum_is_that_of_natural_images():
         mean = [power[ring == k].mean() for k in range(1, 13)]
         slopes.append(np.polyfit(np.log(np.sqrt(rings[1:] * rings[:-1])), np.log(mean), 1)[0])
     assert np.mean(slopes) == pytest.approx(-2.0, abs=0.4)
+
+
+def test_coverage_that_is_kept_paints_the_same_bytes_in_any_colors(monkeypatch):
+    """Painted first, painted again, and in other colors: found once, colored each time."""
+    monkeypatch.setattr(discs, "_COVERAGE", ByteCache(discs.KEPT))
+    true, found = discs.coverage, []
+    monkeypatch.setattr(discs, "coverage", lambda *a: found.append(a) or true(*a))
+    edges = cell_edges(40, 0.02)
+    draw = np.random.default_rng(1)
+    mixes = [draw.uniform(-0.1, 1, (3, 12)).astype(np.float32) for _ in range(2)]
+    chart = dead_leaves.DeadLeaves(3, 1.0)
+    never = dead_leaves.DeadLeaves(3, 1.0, keep=False)
+    alone = [never.averages(edges, edges, mix) for mix in mixes]
+    kept = chart.crop_to_cells(edges, edges)
+    assert kept.keep
+    found.clear()
+    for _ in range(2):
+        for mix, plain in zip(mixes, alone, strict=True):
+            assert kept.averages(edges, edges, mix).tobytes() == plain.tobytes()
+    once = len({(str(a[1]), str(a[2]), str(a[3])) for a in found})
+    assert len(found) == once > 0
+    shifted = edges + 0.001
+    assert kept.averages(shifted, edges, mixes[0]).tobytes() != alone[0].tobytes()
+    many = cell_edges(dead_leaves.KEPT_CELLS // 1000 + 1, 1e-4), cell_edges(1000, 1e-4)
+    assert not chart.crop_to_cells(*many).keep
+
+
+def test_coverage_is_bounded(monkeypatch):
+    cache = ByteCache(1_000_000)
+    monkeypatch.setattr(discs, "_COVERAGE", cache)
+    chart = dead_leaves.DeadLeaves(3, 1.0)
+    for number in range(5):
+        edges = cell_edges(100, 0.001 + 1e-5 * number)
+        chart.crop_to_cells(edges, edges).averages(edges, edges, np.ones((1, 12)))
+        assert 0 < cache.nbytes <= 1_000_000

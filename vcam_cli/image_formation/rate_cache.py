@@ -31,10 +31,10 @@ class _CachedRate:
 class RateCache:
     """The light of the last cameras."""
 
-    def __init__(self, limit: int = _LIMIT) -> None:
+    def __init__(self, limit: int = _LIMIT, strict: bool = False) -> None:
         self.limit = limit
-        """Bytes of light that are kept; the newest always."""
-        self._rates: ByteCache[_CachedRate] = ByteCache(limit)
+        """Bytes of light that are kept; the newest always, unless `strict`."""
+        self._rates: ByteCache[_CachedRate] = ByteCache(limit, strict)
         self._transfer: tuple[str, Transfer] | None = None
         self._peaks: dict[str, float] = {}
 
@@ -77,13 +77,22 @@ class RateCache:
         Rate
             The light.
         """
-        if key in self._peaks:
-            level = min(ceiling, self._peaks[key])
-            return self._rates.get((key, level), lambda: _CachedRate(make())).rate
+        peak = self._peaks.get(key)
+        if peak is not None:
+            return self._rates.get((key, min(ceiling, peak)), lambda: _kept(make())).rate
         if len(self._peaks) >= _MOST:
             self._peaks.clear()
         rate = make()
-        self._peaks[key] = rate.spectrum.peak
-        return self._rates.get(
-            (key, min(ceiling, rate.spectrum.peak)), lambda: _CachedRate(rate)
-        ).rate
+        self._peaks[key] = peak = rate.spectrum.peak
+        return self._rates.get((key, min(ceiling, peak)), lambda: _kept(rate)).rate
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the light that is kept [bytes]."""
+        return self._rates.nbytes
+
+
+def _kept(rate: Rate) -> _CachedRate:
+    """Return light as it is kept: nobody who gets it may write into it."""
+    rate.values.setflags(write=False)
+    return _CachedRate(rate)

@@ -15,10 +15,13 @@ T = TypeVar("T", bound=_Sized)
 
 
 class ByteCache(Generic[T]):
-    """Keeps the results used last, at most `limit` bytes of them together (the newest always)."""
+    """Keeps the results used last, at most `limit` bytes of them together.
 
-    def __init__(self, limit: int) -> None:
-        self._limit = limit
+    The newest is kept always, or, `strict`, only where it is within the limit by itself.
+    """
+
+    def __init__(self, limit: int, strict: bool = False) -> None:
+        self._limit, self._least = limit, 0 if strict else 1
         self._kept: OrderedDict[Hashable, T] = OrderedDict()
         self._lock = Lock()
 
@@ -46,7 +49,7 @@ class ByteCache(Generic[T]):
         value = compute()
         with self._lock:
             self._kept[key] = value
-            while len(self._kept) > 1 and self.nbytes > self._limit:
+            while len(self._kept) > self._least and self.nbytes > self._limit:
                 self._kept.popitem(last=False)
         return value
 

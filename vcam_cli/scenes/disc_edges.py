@@ -1,4 +1,4 @@
-"""Cells crossed by the edges of opaque discs: the average color of each.
+"""Cells crossed by the edges of opaque discs: what is seen in each, and its average color.
 
 A cell crossed by one visible edge takes the exact area of the circle within the cell. Cells
 crossed by more are divided in four, again and again, and the discs in what is left are then taken
@@ -7,7 +7,7 @@ cells are divided is chosen by it (`divisions`).
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -104,8 +104,57 @@ class CrossedCells:
     """Labels of the edges (sum of count,), cell by cell and falling within a cell."""
 
 
-def average_colors(discs: Discs, cells: CrossedCells, color: Array, divided: int = MOST) -> Array:
-    """Return the average colors of crossed cells.
+@dataclass(frozen=True)
+class EdgeShares:
+    """What is seen in cells that edges cross: labels, and the part of the cell that each fills."""
+
+    single: Array
+    """Whether one edge alone crosses a cell (m,)."""
+    front: Array
+    """Label of what lies in front, of cells with a single edge (s,)."""
+    back: Array
+    """Label of what lies behind it (s,)."""
+    inside: Array
+    """Part of the cell that lies in front (s,)."""
+    cell: Array
+    """Cell, counted among those of several edges (t,)."""
+    label: Array
+    """Label that is seen in it (t,)."""
+    weight: Array
+    """Part of the cell that it fills (t,)."""
+
+    @property
+    def nbytes(self) -> int:
+        """Memory [bytes]."""
+        return sum(getattr(self, field.name).nbytes for field in fields(self))
+
+    def colors(self, color: Array) -> Array:
+        """Return the average color of every cell.
+
+        Parameters
+        ----------
+        color : Array
+            Color (R, labels) of the ground and of every disc.
+
+        Returns
+        -------
+        Array
+            Averages (R, m), in the unit of `color`.
+        """
+        out = np.empty((len(color), len(self.single)))
+        for plane, row in zip(out, color, strict=True):
+            light = row[self.front] * self.inside + row[self.back] * (1 - self.inside)
+            plane[self.single] = light
+        if len(self.cell):
+            several = ~self.single
+            count = int(several.sum())
+            for plane, row in zip(out, color, strict=True):
+                plane[several] = np.bincount(self.cell, row[self.label] * self.weight, count)
+        return out
+
+
+def edge_shares(discs: Discs, cells: CrossedCells, divided: int = MOST) -> EdgeShares:
+    """Return what is seen in crossed cells.
 
     Parameters
     ----------
@@ -113,24 +162,21 @@ def average_colors(discs: Discs, cells: CrossedCells, color: Array, divided: int
         The discs; a later one lies in front.
     cells : CrossedCells
         The cells (m,) that edges cross.
-    color : Array
-        Color (R, labels) of the ground and of every disc.
     divided : int
         How often a cell of several edges is divided.
 
     Returns
     -------
-    Array
-        Averages (R, m), in the unit of `color`.
+    EdgeShares
+        Labels and parts; of any colors.
     """
-    out = np.empty((len(color), len(cells.back)))
     several = cells.count > 1
     single = ~several
     pair = np.repeat(several, cells.count)
     front, back = cells.front[~pair], cells.back[single]
     inside = cover(discs, front - 1, cells.box[:, single])
-    for plane, row in zip(out, color, strict=True):
-        plane[single] = row[front] * inside + row[back] * (1 - inside)
+    cell = label = np.zeros(0, np.intp)
+    weight = np.zeros(0)
     if several.any():
         number = np.arange(int(several.sum()))
         parts = _Parts(
@@ -140,8 +186,8 @@ def average_colors(discs: Discs, cells: CrossedCells, color: Array, divided: int
             np.repeat(number, cells.count[several]),
             cells.front[pair],
         )
-        out[:, several] = _resolve(discs, parts, color, divided)
-    return out
+        cell, label, weight = _resolve(discs, parts, divided)
+    return EdgeShares(single, front, back, inside, cell, label, weight)
 
 
 @dataclass(frozen=True)
@@ -160,9 +206,8 @@ class _Parts:
     """Label of each such edge (p,), falling within a rectangle."""
 
 
-def _resolve(discs: Discs, parts: _Parts, color: Array, divided: int) -> Array:
-    """Return average colors (R, cells) of the cells the parts belong to, one part each at first."""
-    count = len(parts.cell)
+def _resolve(discs: Discs, parts: _Parts, divided: int) -> tuple[Array, Array, Array]:
+    """Return cell, label and weight of all that is seen in cells, one part each at first."""
     found: list[tuple[Array, Array, Array]] = []  # cell, label, how much of the cell
     share = 1.0
     for _ in range(divided):
@@ -181,7 +226,7 @@ def _resolve(discs: Discs, parts: _Parts, color: Array, divided: int) -> Array:
     found.append((parts.cell[parts.of_part], parts.front, share * seen))
     found.append((parts.cell, parts.back, share * behind))
     cell, label, weight = (np.concatenate(each) for each in zip(*found, strict=True))
-    return np.stack([np.bincount(cell, row[label] * weight, minlength=count) for row in color])
+    return cell, label, weight
 
 
 def _select_parts(parts: _Parts, wanted: Array) -> _Parts:

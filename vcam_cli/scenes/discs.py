@@ -7,17 +7,66 @@ Why labels: the picture is painted once as disc numbers, and colored afterwards,
 of planes costs one painting.
 """
 
+import hashlib
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.physics.cache import ByteCache
 from vcam_cli.scenes import disc_edges
 from vcam_cli.scenes.disc_edges import CrossedCells, Discs
 from vcam_cli.scenes.runs import concatenate_ranges, expand_ranges, topmost_numbers
 
 Cells = tuple[slice, slice]
 """Rows and columns of cells."""
+
+
+KEPT = 1 << 26
+"""Bytes of coverage that are kept: cameras that differ in the lens alone see the same discs."""
+_COVERAGE: ByteCache["Coverage"] = ByteCache(KEPT)
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """Which disc is seen where on a grid of cells: their picture but for its colors."""
+
+    near: Array
+    """Indices of the discs that labels count, from 1: 0 is the ground, the last is nothing."""
+    label: Array
+    """Label (ny, nx) that fills each cell."""
+    row: Array
+    """Rows of the cells that edges cross (m,)."""
+    column: Array
+    """Their columns (m,)."""
+    shares: disc_edges.EdgeShares | None
+    """What is seen in those; None where there are none."""
+
+    @property
+    def nbytes(self) -> int:
+        """Memory [bytes]."""
+        own = self.near.nbytes + self.label.nbytes + self.row.nbytes + self.column.nbytes
+        return own + (0 if self.shares is None else self.shares.nbytes)
+
+    def paint(self, color: Array, out: Array) -> None:
+        """Write the cell averages into `out` (R, ny, nx).
+
+        Parameters
+        ----------
+        color : Array
+            Colors (R, n + 1), see `paint`.
+        out : Array
+            Averages.
+        """
+        nothing = np.zeros((len(color), 1), color.dtype)
+        color = np.concatenate([color[:, :1], color[:, self.near + 1], nothing], axis=1)
+        index = self.label.astype(np.intp)
+        for plane, line in zip(out, color, strict=True):
+            np.take(line, index, out=plane, mode="clip")
+        if self.shares is not None:
+            for plane, light in zip(out, self.shares.colors(color), strict=True):
+                plane[self.row, self.column] = light
 
 
 def paint(
@@ -28,6 +77,7 @@ def paint(
     out: Array,
     hidden: Cells | None = None,
     divided: int = disc_edges.MOST,
+    keep: bool = False,
 ) -> None:
     """Write the cell averages of discs on a ground into `out` (R, ny, nx).
 
@@ -45,26 +95,37 @@ def paint(
         Cells of which nothing is seen; they become 0.
     divided : int, optional
         How often cells are divided in which edges meet, see `disc_edges.divisions`.
+    keep : bool, optional
+        Whether the coverage is kept, at most `KEPT` bytes of it, for the same discs in other
+        colors on the same cells.
     """
+    make = partial(coverage, discs, x_edges, y_edges, hidden, divided)
+    if not keep:
+        make().paint(color, out)
+        return
+    digest = hashlib.blake2b(digest_size=16)
+    for part in (discs.x, discs.y, discs.radius, x_edges, y_edges):
+        digest.update(b"%d " % len(part) + np.ascontiguousarray(part, float).tobytes())
+    _COVERAGE.get((digest.digest(), str(hidden), divided), make).paint(color, out)
+
+
+def coverage(
+    discs: Discs, x_edges: Array, y_edges: Array, hidden: Cells | None, divided: int
+) -> Coverage:
+    """Return which disc is seen where; parameters as those of `paint`."""
     near = discs.find_near(x_edges[0], x_edges[-1], y_edges[0], y_edges[-1])
     discs = discs.select(near)
-    nothing = np.zeros((len(color), 1), color.dtype)
-    color = np.concatenate([color[:, :1], color[:, near + 1], nothing], axis=1)
     spans = _spans(discs, x_edges, y_edges)
     label = _labels(spans, len(discs), (len(y_edges) - 1, len(x_edges) - 1), hidden)
-    index = label.astype(np.intp)
-    for plane, row in zip(out, color, strict=True):
-        np.take(row, index, out=plane, mode="clip")
     cell, front = _crossed_cells(spans, label)
-    if len(cell):
-        starts = np.flatnonzero(np.diff(cell, prepend=-1))
-        count = np.diff(starts, append=len(cell))
-        row, column = np.divmod(cell[starts], label.shape[1])
-        box = np.stack([x_edges[column], x_edges[column + 1], y_edges[row], y_edges[row + 1]])
-        crossed = CrossedCells(box, label[row, column], count, front)
-        lights = disc_edges.average_colors(discs, crossed, color, divided)
-        for plane, light in zip(out, lights, strict=True):
-            plane[row, column] = light
+    starts = np.flatnonzero(np.diff(cell, prepend=-1))
+    row, column = np.divmod(cell[starts], label.shape[1])
+    if not len(cell):
+        return Coverage(near, label, row, column, None)
+    count = np.diff(starts, append=len(cell))
+    box = np.stack([x_edges[column], x_edges[column + 1], y_edges[row], y_edges[row + 1]])
+    crossed = CrossedCells(box, label[row, column], count, front)
+    return Coverage(near, label, row, column, disc_edges.edge_shares(discs, crossed, divided))
 
 
 def averages(discs: Discs, color: Array, x_edges: Array, y_edges: Array) -> Array:

@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
+import math
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
+from threading import Lock
 from typing import Any
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.image_formation.rate_cache import RateCache
+from vcam_cli.simulation.output.provenance import data_files
+from vcam_cli.simulation.scene_files import scene_bytes
 
 Picture = tuple[Any, tuple[str, ...]]
 """What a scene's file holds, and notes about it."""
+KEPT = 1 << 26
+"""Bytes of light, and of a picture, that a process keeps by itself: 12 megapixels of light."""
+_FILES = 1024
+"""Files whose states are remembered."""
+_State = tuple[int, int, int] | None
+"""Time of the last change [ns], size and number of a file; None where it cannot be looked at."""
 
 
 @dataclass
@@ -21,11 +33,69 @@ class Shared:
     """
 
     rate_cache: RateCache = field(default_factory=RateCache)
+    largest_picture: float = math.inf
+    """Bytes of a picture up to which it is kept."""
     _last: tuple[str, Picture] | None = None
 
     def picture(self, camera: Camera, read: Callable[[], Picture]) -> Picture:
         """Return what `read` gives, or gave for a camera before with the same file as its scene."""
         key = camera.scene.source.model_dump_json(exclude={"crop"})
-        if self._last is None or self._last[0] != key:
-            self._last = (key, read())
-        return self._last[1]
+        last = self._last
+        if last is not None and last[0] == key:
+            return last[1]
+        found = read()
+        if scene_bytes(found[0]) <= self.largest_picture:
+            self._last = key, found
+        return found
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of light and picture [bytes]."""
+        last = self._last
+        return self.rate_cache.nbytes + (0 if last is None else scene_bytes(last[1][0]))
+
+
+class Recent:
+    """What the last simulations of this process have in common, as long as no file changes."""
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self.clear()
+
+    def clear(self) -> None:
+        """Keep nothing of what was."""
+        self._shared = Shared(RateCache(KEPT, strict=True), KEPT)
+        self._files: dict[Path, _State] = {}
+
+    def shared_with(self, camera: Camera) -> Shared:
+        """Return what a camera may share: nothing where a file has changed since it was read.
+
+        Parameters
+        ----------
+        camera : Camera
+            The camera.
+
+        Returns
+        -------
+        Shared
+            What the cameras before had in common.
+        """
+        found = {path: _state(path) for path in data_files(camera)}
+        with self._lock:
+            changed = any(self._files.get(path, state) != state for path, state in found.items())
+            if changed or len(self._files) > _FILES:
+                self.clear()
+            self._files |= found
+            return self._shared
+
+
+RECENT = Recent()
+"""That of `simulate` and `plan` where a caller hands in none of its own."""
+
+
+def _state(path: Path) -> _State:
+    try:
+        status = os.stat(path)
+    except (OSError, ValueError):
+        return None
+    return status.st_mtime_ns, status.st_size, status.st_ino

@@ -16,7 +16,7 @@ from vcam_cli.simulation import pipeline, remarks
 from vcam_cli.simulation.photograph import Photograph, needs_picture
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.run import Run
-from vcam_cli.simulation.shared import Shared
+from vcam_cli.simulation.shared import RECENT, Shared
 
 
 class Result(Photograph):
@@ -62,7 +62,8 @@ def simulate(
     watch : callable or Observer, optional
         Follows the run, and later the result's properties: see `vcam_cli.progress.observer`.
     shared : Shared, optional
-        What cameras before this one had in common with it; results do not depend on it.
+        What cameras before this one had in common with it; results do not depend on it. By
+        default the light of the last cameras, 64 MB of it, and their picture up to 64 MB.
 
     Raises
     ------
@@ -79,7 +80,8 @@ def simulate(
         require_whole(workers, "workers", 1)
     stages = Stages(watch=observer(watch))
     try:
-        return _simulate(camera, workers or threads(camera), stages, shared or Shared())
+        shared = shared or RECENT.shared_with(camera)
+        return _simulate(camera, workers or threads(camera), stages, shared)
     except BadInput as error:
         raise error.with_places(camera.locate) from None
 
@@ -90,8 +92,10 @@ def prepare(
 ) -> tuple[Prepared, remarks.Notes]:
     """Return the camera ready to take its frame, and notes: what `vcam plan` shows."""
     try:
-        run = Run(workers or threads(camera), Stages(watch=observer(watch)))
-        ready, notes = pipeline.prepare(camera, run, Shared())
+        shared = RECENT.shared_with(camera)
+        stages = Stages(watch=observer(watch))
+        run = Run(workers or threads(camera), stages, shared.rate_cache)
+        ready, notes = pipeline.prepare(camera, run, shared)
         return ready, remarks.Notes(ready, notes)
     except BadInput as error:
         raise error.with_places(camera.locate) from None

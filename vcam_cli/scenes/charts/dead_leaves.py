@@ -44,6 +44,9 @@ FINEST = 1000
 is seen where takes time and gigabytes: larger cells are divided."""
 AT_ONCE = 1 << 18
 """Cells that are painted at once where many leaves are seen: bounds the memory of temporaries."""
+KEPT_CELLS = 1 << 22
+"""Cells of a picture, parts counted, up to which what is seen in them is kept for other lenses. Of
+more, the last bands of a picture would drop its first."""
 SUMMED, SUMMED_FAR = 32, 4
 """Parts along each side of a cell from which on its average is read from sums over one period, of
 cells within and beyond one. Their edges then fall between those of the parts: of white, an rms of
@@ -190,6 +193,8 @@ class PlacedLeaves(Chart):
     """Unit of the leaves' places [m]."""
     divided: int = MOST
     """How often cells are divided in which edges meet."""
+    keep: bool = False
+    """Whether what is seen is kept for cameras that see it on the same cells."""
 
     def paint(
         self,
@@ -202,7 +207,7 @@ class PlacedLeaves(Chart):
         """Write the averages over the cells into `out`; 0 in the cells that are hidden."""
         color = self.leaves.color(mix).astype(mix.dtype, copy=False)
         x, y = x_edges / self.unit, y_edges / self.unit
-        discs.paint(self.leaves.discs, color, x, y, out, hidden, self.divided)
+        discs.paint(self.leaves.discs, color, x, y, out, hidden, self.divided, self.keep)
 
     def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
         """Return the energy of leaves anywhere."""
@@ -224,6 +229,9 @@ class DeadLeaves(Chart):
     """Longer side of the frame [m]."""
     divided: int = MOST
     """How often cells are divided in which edges meet."""
+    keep: bool | None = None
+    """Whether what is seen is kept for cameras that see it on the same cells; None until the whole
+    grid is known."""
     edge_seconds = property(lambda self: EDGE_SECONDS[0] + EDGE_SECONDS[1] * self.divided)
     undivided = property(lambda self: self.unit / FINEST)
 
@@ -244,9 +252,12 @@ class DeadLeaves(Chart):
         What is not seen is found on cells of `step` times `step`: a leaf behind one that covers
         such a cell is behind it in all of its cells, so that no cell changes.
         """
-        if self._parts(x_edges, y_edges) > 1:
-            return self
-        laid = self._placed_leaves(x_edges, y_edges)
+        parts = self._parts(x_edges, y_edges)
+        cells = (len(x_edges) - 1) * (len(y_edges) - 1) * parts**2
+        whole = self if self.keep is not None else replace(self, keep=cells <= KEPT_CELLS)
+        if parts > 1:
+            return whole
+        laid = whole._placed_leaves(x_edges, y_edges)
         step = int(2 * SMALLEST * self.unit * (len(x_edges) - 1) / (x_edges[-1] - x_edges[0]))
         if step < 4:
             return laid
@@ -321,7 +332,7 @@ class DeadLeaves(Chart):
         left, right, top, bottom = (end / self.unit for end in (x[0], x[-1], y[0], y[-1]))
         leaves = generate_leaves(self.seed)
         copies = _periodic_copies(leaves, left, right, top, bottom)
-        return PlacedLeaves(copies, self.unit, self.divided)
+        return PlacedLeaves(copies, self.unit, self.divided, bool(self.keep))
 
 
 def _divided(edges: Array, parts: int) -> Array:
