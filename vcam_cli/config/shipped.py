@@ -19,6 +19,7 @@ KINDS = {
     "technologies": "a technology",
     "studies": "a study",
     "measurements": "a measurement",
+    "lenses": "a lens",
     "spectra": "a spectrum",
 }
 """Folder of `configs/` -> what one of its files is called in messages."""

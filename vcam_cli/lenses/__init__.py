@@ -1,0 +1,1 @@
+"""Lenses by their prescriptions: traced rays, true pupils, wavefronts."""
