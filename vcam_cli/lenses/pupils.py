@@ -6,13 +6,14 @@ Its area in direction cosines is the irradiance of a uniform Lambertian scene ov
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.lenses.fields import View, reversed_lens
-from vcam_cli.lenses.tracing import Rays, trace
+from vcam_cli.lenses.tracing import Rays, Trace, trace
 
 ANGLES = 256
 """Directions in which the edge is sought: corners of vignetted pupils cost 1e-5 of the area."""
@@ -69,29 +70,71 @@ def pupils(
     Pupil
         The pupils (F, W).
     """
-    search = _Search(view, np.asarray(heights, float), wavelengths, vignetted)
+    seen = _Backwards(view, np.asarray(heights, float), wavelengths, vignetted)
     scale = view.paraxial.exit_pupil_diameter / 2 / abs(view.exit_pupil)
-    center = search.centers(scale)
-    azimuth = 2 * np.pi * np.arange(angles // 2 + 1) / angles
-    half = search.edge(center, azimuth, scale)  # the lens is symmetric about the meridian
-    radius = np.concatenate([half, half[..., -2:0:-1]], axis=-1)
-    return Pupil(center, radius)
+    return Pupil(*_edges(seen.fullness, seen.chief, scale, angles))
 
 
-class _Search:
-    """Finds the edges of pupils: fullness is how far out, of all apertures, a ray goes at most."""
+def beam_edges(view: View, angles: Array, wavelength: float, count: int, vignetted: bool) -> Pupil:
+    """Return the edges of the beams that come from object points, where they are launched.
+
+    Parameters
+    ----------
+    view : View
+        The lens before its object.
+    angles : ndarray
+        Field angles (F,) [rad].
+    wavelength : float
+        Wavelength [m].
+    count : int
+        Directions of the edge.
+    vignetted : bool
+        Whether the apertures that the file fixes clip, besides the stop.
+
+    Returns
+    -------
+    Pupil
+        Places (u, v) (F, 1) in polar coordinates, in meters.
+    """
+    waves = np.array([wavelength])
+    stop = view.paraxial.stop_semi_diameter
+
+    def fullness(u: Array, v: Array) -> Array:
+        found = view.trace(angles, waves, u, v)
+        return _most(found, stop, vignetted)
+
+    chief = view.chief(angles, waves)[..., None]
+    return Pupil(*_edges(fullness, chief, view.lens.pupil_diameter / 2, count))
+
+
+def _most(found: Trace, stop: float, vignetted: bool) -> Array:
+    """Return how full the fullest aperture is, by radius; infinite where a ray fails."""
+    most = np.hypot(found.stop_x, found.stop_y) / stop
+    if vignetted:
+        most = np.fmax(most, np.sqrt(found.fullness))
+    return np.where(found.rays.alive & np.isfinite(most), most, np.inf)
+
+
+Fullness = Callable[[Array, Array], Array]
+"""From places (F, W, n) to how full the fullest aperture is there: an edge has 1."""
+
+
+class _Backwards:
+    """Rays from image points, by their direction cosines."""
 
     def __init__(self, view: View, heights: Array, wavelengths: Array, vignetted: bool) -> None:
         self._lens = reversed_lens(view.lens)
         self._gap = view.lens.surfaces[-1].thickness
-        self._guess = view.exit_pupil
         self._stop = view.paraxial.stop_semi_diameter
         self._heights = heights[:, None, None]
         self._indices = self._lens.indices(wavelengths)[:, :, None]
         self._vignetted = vignetted
+        shape = len(heights), len(wavelengths), 1
+        toward = -self._heights / np.hypot(self._heights, view.exit_pupil)
+        self.chief = np.broadcast_to(toward, shape)
 
     def fullness(self, x: Array, y: Array) -> Array:
-        """Return it for direction cosines (F, W, n); infinite where a ray fails."""
+        """Return it for direction cosines (F, W, n)."""
         square = 1 - x * x - y * y
         real = square > 1 - WIDEST**2
         n = np.sqrt(np.where(real, square, 1.0))
@@ -100,58 +143,63 @@ class _Search:
         rays = Rays(at, zero, zero - self._gap, x, y, n, zero, real)
         rays = rays.after(self._gap / n, 1.0)
         found = trace(self._lens.surfaces, self._indices, rays, self._lens.stop)
-        stop = np.hypot(found.stop_x, found.stop_y) / self._stop
-        most = np.fmax(stop, np.sqrt(found.fullness)) if self._vignetted else stop
-        return np.where(found.rays.alive & np.isfinite(most), most, np.inf)
+        return _most(found, self._stop, self._vignetted)
 
-    def centers(self, scale: float) -> Array:
-        """Return the direction cosine along x of a ray well inside the pupil (F, W)."""
-        shape = len(self._heights), self._indices.shape[1], 1
-        chief = np.broadcast_to(-self._heights / np.hypot(self._heights, self._guess), shape)
-        steps = np.linspace(-2.5, 2.5, SCAN) * scale
-        found = np.full(shape[:2], np.nan)
-        for reach in (1.0, 3.0, 9.0):
-            x = chief + reach * steps
-            fullness = self.fullness(x, np.zeros(x.shape))
-            inside = fullness < 1
-            some = inside.any(axis=-1)
-            middle = (np.where(inside, x, 0).sum(axis=-1)) / np.maximum(inside.sum(axis=-1), 1)
-            found = np.where(np.isnan(found) & some, middle, found)
-            if not np.isnan(found).any():
-                break
-        return found
 
-    def edge(self, center: Array, azimuth: Array, scale: float) -> Array:
-        """Return the radius (F, W, angles) at which the fullness is 1, in a bracket (Illinois)."""
-        cosine, sine = np.cos(azimuth), np.sin(azimuth)
+def _edges(fullness: Fullness, chief: Array, scale: float, count: int) -> tuple[Array, Array]:
+    """Return centers (F, W) and radii (F, W, count) of what is bright, in its coordinates."""
+    center = _centers(fullness, chief, scale)
+    azimuth = 2 * np.pi * np.arange(count // 2 + 1) / count
+    half = _edge(fullness, center, azimuth, scale)  # the lens is symmetric about the meridian
+    return center, np.concatenate([half, half[..., -2:0:-1]], axis=-1)
 
-        def over(radius: Array) -> Array:
-            found = self.fullness(center[..., None] + radius * cosine, radius * sine)
-            return np.minimum(found, 4.0) - 1
 
-        shape = (*center.shape, len(azimuth))
-        low, high = np.zeros(shape), np.full(shape, STRIDE * scale)
-        at_low, at_high = over(low), over(high)
-        for _ in range(STRIDES):  # step by step: beyond the edge rays may come through again
-            short = at_high < 0
-            if not short.any():
-                break
-            low, at_low = np.where(short, high, low), np.where(short, at_high, at_low)
-            high = np.where(short, high + STRIDE * scale, high)
-            at_high = np.where(short, over(high), at_high)
-        side = np.zeros(shape)
-        for step in range(ROOT_STEPS):
-            width = high - low
-            if not (width > EDGE * scale).any():
-                break
-            secant = low - at_low * width / (at_high - at_low)
-            # Every third step halves: a ray that fails beyond the edge has no useful height.
-            trial = np.where((at_high > 2.9) | (step % 4 == 3), low + width / 2, secant)
-            value = over(trial)
-            inside = value < 0
-            at_high = np.where(inside & (side == 1), at_high / 2, at_high)
-            at_low = np.where(~inside & (side == -1), at_low / 2, at_low)
-            side = np.where(inside, 1, -1)
-            low, at_low = np.where(inside, trial, low), np.where(inside, value, at_low)
-            high, at_high = np.where(inside, high, trial), np.where(inside, at_high, value)
-        return np.where(np.isnan(center)[..., None], np.nan, (low + high) / 2)
+def _centers(fullness: Fullness, chief: Array, scale: float) -> Array:
+    """Return the place along x of a ray well inside (F, W)."""
+    steps = np.linspace(-2.5, 2.5, SCAN) * scale
+    found = np.full(chief.shape[:2], np.nan)
+    for reach in (1.0, 3.0, 9.0):
+        x = chief + reach * steps
+        inside = fullness(x, np.zeros(x.shape)) < 1
+        some = inside.any(axis=-1)
+        middle = np.where(inside, x, 0).sum(axis=-1) / np.maximum(inside.sum(axis=-1), 1)
+        found = np.where(np.isnan(found) & some, middle, found)
+        if not np.isnan(found).any():
+            break
+    return found
+
+
+def _edge(fullness: Fullness, center: Array, azimuth: Array, scale: float) -> Array:
+    """Return the radius (F, W, angles) at which the fullness is 1, in a bracket (Illinois)."""
+    cosine, sine = np.cos(azimuth), np.sin(azimuth)
+
+    def over(radius: Array) -> Array:
+        found = fullness(center[..., None] + radius * cosine, radius * sine)
+        return np.minimum(found, 4.0) - 1
+
+    shape = (*center.shape, len(azimuth))
+    low, high = np.zeros(shape), np.full(shape, STRIDE * scale)
+    at_low, at_high = over(low), over(high)
+    for _ in range(STRIDES):  # step by step: beyond the edge rays may come through again
+        short = at_high < 0
+        if not short.any():
+            break
+        low, at_low = np.where(short, high, low), np.where(short, at_high, at_low)
+        high = np.where(short, high + STRIDE * scale, high)
+        at_high = np.where(short, over(high), at_high)
+    side = np.zeros(shape)
+    for step in range(ROOT_STEPS):
+        width = high - low
+        if not (width > EDGE * scale).any():
+            break
+        secant = low - at_low * width / (at_high - at_low)
+        # Every third step halves: a ray that fails beyond the edge has no useful height.
+        trial = np.where((at_high > 2.9) | (step % 4 == 3), low + width / 2, secant)
+        value = over(trial)
+        inside = value < 0
+        at_high = np.where(inside & (side == 1), at_high / 2, at_high)
+        at_low = np.where(~inside & (side == -1), at_low / 2, at_low)
+        side = np.where(inside, 1, -1)
+        low, at_low = np.where(inside, trial, low), np.where(inside, value, at_low)
+        high, at_high = np.where(inside, high, trial), np.where(inside, at_high, value)
+    return np.where(np.isnan(center)[..., None], np.nan, (low + high) / 2)

@@ -1,0 +1,207 @@
+"""The OTF of a pupil of any shape: its samples on a grid, correlated with themselves.
+
+    H(f) = integral P(u - s/2) P*(u + s/2) d2u / area,   s = wavelength f,
+
+with the pupil u in direction cosines on the image side, where light of even radiance has even
+power, and P = exp(2 pi i W / wavelength) inside the pupil. It is the full transfer function, of
+aberrations and of diffraction.
+
+Cells at the edge count by the part of them that lies inside, sharpened by a 24th of the
+Laplacian: the OTF of a disk of 128 samples errs by 2e-4, of 256 by 7e-5. Between lags cubic
+splines interpolate what differs from the OTF of a disk, whose cusp at 0 they would blunt.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from vcam_cli.arrays import Array
+from vcam_cli.physics import diffraction, zernike
+
+FEWEST, MOST = 128, 1024
+"""Samples across a pupil."""
+PER_RADIAN, PER_ROOT_RADIAN = 3.4, 25.0
+"""Samples for each radian of phase that half a pupil holds at its steepest place, and for the
+square root of those radians: what `pupil_grid` needs for 1e-4 of the light, and half of that."""
+PARTS = 8
+"""Parts along each side that a cell at the edge is cut into."""
+MIRRORED_LAGS = 12
+"""Lags kept on the far side of the axis, where the spline's coefficients have to settle."""
+
+
+def indices(order: int) -> tuple[int, ...]:
+    """Return the Noll indices up to a radial order of the polynomials that are even in y."""
+    count = (order + 1) * (order + 2) // 2
+    return tuple(j for j in range(1, count + 1) if zernike.noll_orders(j)[1] >= 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Mask:
+    """What of each cell of a grid over the pupil's frame lies inside; the frame is -1 .. 1."""
+
+    weights: Array
+    """(n, n) over y and x, sharpened."""
+
+    @property
+    def samples(self) -> int:
+        """Samples across, with one beyond the frame on each side."""
+        return len(self.weights)
+
+    @property
+    def step(self) -> float:
+        """Between samples, in half frames."""
+        return 2 / (self.samples - 2)
+
+    @property
+    def share(self) -> float:
+        """Area over that of the frame's disk."""
+        return float(self.weights.sum()) * self.step**2 / math.pi
+
+
+def mask(inside: Callable[[Array, Array], Array], samples: int) -> Mask:
+    """Return the mask of a shape.
+
+    Parameters
+    ----------
+    inside : callable
+        From x and y in half frames, of one shape, to whether they lie inside.
+    samples : int
+        Samples across the frame.
+
+    Returns
+    -------
+    Mask
+        The mask.
+    """
+    at = _places(samples)
+    x, y = np.meshgrid(at, at)
+    here = inside(x, y)
+    step = 2 / samples
+    weights = here.astype(float)
+    near = np.zeros(here.shape, bool)
+    for axis in (0, 1):  # cells whose neighbors differ, and theirs
+        change = np.diff(here, axis=axis)
+        near |= np.pad(change, [(1, 0) if a == axis else (0, 0) for a in (0, 1)])
+        near |= np.pad(change, [(0, 1) if a == axis else (0, 0) for a in (0, 1)])
+    near[1:-1, 1:-1] |= near[2:, 1:-1] | near[:-2, 1:-1] | near[1:-1, 2:] | near[1:-1, :-2]
+    part = ((np.arange(PARTS) + 0.5) / PARTS - 0.5) * step
+    fine_x = np.broadcast_to(x[near][:, None, None] + part, (near.sum(), PARTS, PARTS))
+    fine_y = np.broadcast_to(y[near][:, None, None] + part[:, None], fine_x.shape)
+    weights[near] = inside(fine_x, fine_y).mean(axis=(1, 2))
+    around = -4 * weights
+    around[1:-1, 1:-1] += weights[2:, 1:-1] + weights[:-2, 1:-1]
+    around[1:-1, 1:-1] += weights[1:-1, 2:] + weights[1:-1, :-2]
+    return Mask((weights - around / 24).astype(np.float32))
+
+
+def _places(samples: int) -> Array:
+    return (np.arange(samples + 2) - (samples + 1) / 2) * (2 / samples)
+
+
+def samples_across(slope: float) -> int:
+    """Return the samples for a wavefront's largest slope [wavelengths per half frame]."""
+    radians = 2 * math.pi * slope
+    wanted = max(FEWEST, PER_RADIAN * radians, PER_ROOT_RADIAN * math.sqrt(radians))
+    return min(32 * math.ceil(wanted / 32), MOST)
+
+
+@lru_cache(maxsize=8)
+def _basis(samples: int, order: int) -> Array:
+    """Return the polynomials (T, n, n) of `indices` on the grid."""
+    at = _places(samples)
+    x, y = np.meshgrid(at, at)
+    rho, theta = np.hypot(x, y), np.arctan2(y, x)
+    found = np.array([zernike.polynomial(j, rho, theta) for j in indices(order)])
+    return found.astype(np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class OtfGrid:
+    """An OTF over lags in half frames: a disk's, and splines of what differs from it."""
+
+    step: float
+    disk: float
+    """Radius of that disk."""
+    spline: Array
+    """Complex coefficients (rows, columns); the lag 0 is at (rows // 2, MIRRORED_LAGS)."""
+
+    @property
+    def nbytes(self) -> int:
+        """Memory that the coefficients take [bytes]."""
+        return self.spline.nbytes
+
+    def interpolate(self, sx: Array, sy: Array) -> Array:
+        """Return the OTF at any lags [half frames], which broadcast; 1 at 0."""
+        from scipy.ndimage import map_coordinates
+
+        sx, sy = np.broadcast_arrays(np.atleast_1d(sx), sy)
+        length = np.hypot(sx, sy)
+        inside = (np.abs(sx) <= 2) & (np.abs(sy) <= 2)
+        left = (sx < 0) | ((sx == 0) & (sy < 0))
+        sign = np.where(left, -1, 1) / self.step
+        row = np.where(inside, sign * sy, 0) + self.spline.shape[0] // 2
+        column = np.where(inside, sign * sx, 0) + MIRRORED_LAGS
+        rest = map_coordinates(self.spline, [row, column], order=3, prefilter=False)
+        otf = _disk(length / (2 * self.disk)) + np.where(left, rest.conj(), rest)
+        otf = np.where(inside, otf, 0).astype(np.complex128)
+        otf /= np.maximum(np.abs(otf), 1.0)
+        otf[length == 0] = 1.0
+        return otf
+
+
+def mixed(grids: Sequence[OtfGrid], shares: Array) -> OtfGrid:
+    """Return the weighted sum of grids of one size, whose shares sum to 1."""
+    spline = sum(g.spline * np.float32(s) for g, s in zip(grids, shares, strict=True))
+    return replace(grids[0], spline=np.asarray(spline))
+
+
+def _disk(lag: Array) -> Array:
+    """Return the OTF of a disk at lags in its diameters."""
+    return np.asarray(diffraction.otf_circular(lag, 1.0, 1.0))
+
+
+def otf_grid(pupil: Mask, waves: Array, order: int) -> OtfGrid:
+    """Return the OTF of a pupil with a wavefront.
+
+    Parameters
+    ----------
+    pupil : Mask
+        Its shape.
+    waves : ndarray
+        Coefficients (T,) of the polynomials of `indices(order)` over the frame [wavelengths].
+    order : int
+        Their highest radial order.
+
+    Returns
+    -------
+    OtfGrid
+        The OTF over lags in half frames.
+    """
+    from scipy import fft
+    from scipy.ndimage import spline_filter
+
+    samples = pupil.samples
+    turns = np.tensordot(waves.astype(np.float32), _basis(samples - 2, order), 1)
+    turns -= np.rint(turns)
+    field = np.empty(turns.shape, np.complex64)
+    np.cos(2 * np.pi * turns, out=field.real)
+    np.sin(2 * np.pi * turns, out=field.imag)
+    field *= pupil.weights
+    size = fft.next_fast_len(2 * samples)
+    spectrum = fft.fft2(field, (size, size))
+    power = spectrum.real**2 + spectrum.imag**2
+    # of a real function only half of the lags are needed; those to the left are conjugate
+    lags = fft.rfft2(power)[:, : samples + 1] / np.float32(size**2 * pupil.weights.sum())
+    otf = np.concatenate([lags[-samples:], lags[: samples + 1]])
+    otf[samples, 0] = 1.0
+    disk = math.sqrt(pupil.share)
+    at = np.arange(-samples, samples + 1) * pupil.step
+    otf -= _disk(np.hypot(at[:, None], at[samples:]) / (2 * disk)).astype(np.float32)
+    left = otf[::-1, MIRRORED_LAGS:0:-1].conj()
+    whole = np.concatenate([left, otf], axis=1)
+    return OtfGrid(pupil.step, disk, spline_filter(whole, 3, output=np.complex64))
