@@ -20,6 +20,7 @@ from vcam_cli.config.validation_messages import describe, failure, fault
 from vcam_cli.config.values import (
     Either,
     File,
+    FileName,
     Fraction,
     Length,
     MaybeLength,
@@ -29,6 +30,11 @@ from vcam_cli.config.values import (
     word_or,
 )
 from vcam_cli.config.yaml_type import YamlType, to_yaml
+
+
+LEAST_F_NUMBER, MOST_F_NUMBER = 0.5, 1e4
+"""A sharp image in air has no less than f/0.5, where the cone of light is a half space (Abbe's sine
+condition; M. Born and E. Wolf, Principles of Optics, 7th ed., 1999, section 4.5.1)."""
 
 
 class FocusWindow(Model):
@@ -102,6 +108,65 @@ class MtfFile(Model):
         "image_height_mm where it has them; straight in between",
         example="mtf.csv",
     )
+
+
+class GivenGlass(Model):
+    """A glass of which nd and Vd are known: n = A + B / l + C / l^3.5, on the normal line."""
+
+    nd: Annotated[float, Number(above=1, below=5)] = key("index at 587.6 nm", example=1.5168)
+    vd: Annotated[float, Number(least=5, most=150)] = key(
+        "Abbe number (nd - 1) / (nF - nC)", example=64.2
+    )
+
+
+def _glasses(given: Any) -> tuple[tuple[str, GivenGlass], ...]:
+    if isinstance(given, tuple):
+        return given
+    if not isinstance(given, Mapping):
+        raise ValueError(f"{describe(given)} is no mapping; write {{NBFD5: {{nd: 1.79, vd: 44.2}}}}")
+    names = [str(name) for name in given]
+    values = read_items(given.items(), GivenGlass.model_validate)
+    return tuple(zip(names, values, strict=True))
+
+
+class Prescription(Model):
+    """A lens by its surfaces and glasses, traced."""
+
+    file: Annotated[str | None, FileName()] = key(
+        "a .zmx file, or a YAML table of surfaces", example="lens.zmx", default=None
+    )
+    use: Annotated[str | None, FileName()] = key(
+        "a lens that ships (vcam list lenses)", example="double-gauss", default=None
+    )
+    scale: Annotated[float, Number(above=0, least=1e-4, most=1e4)] = key(
+        "factor on all its lengths; its f-number stays", example=0.1, default=1.0
+    )
+    f_number: Annotated[float | None, Number(above=0, least=LEAST_F_NUMBER, most=MOST_F_NUMBER)] = (
+        key("f-number that its stop is set to; default the file's", example=4, default=None)
+    )
+    image_plane: Literal["best", "file"] = key(
+        "best: where the wavefront on the axis is flattest; file: as far behind the lens as the"
+        " file has it, moved by the paraxial change for focus_distance",
+        default="best",
+    )
+    glasses: Annotated[
+        tuple[tuple[str, GivenGlass], ...],
+        Either(
+            _glasses, dict[str, GivenGlass], yaml_form=lambda given: to_yaml(dict(given)) or None
+        ),
+    ] = key(
+        "glasses that the catalog does not have, by name",
+        example={"NBFD5": {"nd": 1.7859, "vd": 44.2}},
+        default=(),
+    )
+
+    rules = (exactly_one("file", "use", of="the lens", remedy="write {use: double-gauss}"),)
+
+
+def _prescription(given: Any) -> Prescription:
+    if isinstance(given, str) and given:
+        return Prescription.model_validate({"use": given})
+    return Prescription.model_validate(given)
 
 
 Terms = tuple[tuple[int, float], ...]
@@ -188,9 +253,6 @@ def _terms(given: Mapping[Any, Any]) -> Terms:
     return tuple(sorted(read_items(((name, name) for name in given), term)))
 
 
-LEAST_F_NUMBER, MOST_F_NUMBER = 0.5, 1e4
-"""A sharp image in air has no less than f/0.5, where the cone of light is a half space (Abbe's sine
-condition; M. Born and E. Wolf, Principles of Optics, 7th ed., 1999, section 4.5.1)."""
 _GROUPS = (
     ("focal_length", "field_of_view"),
     ("f_number", "numerical_aperture"),
@@ -201,13 +263,33 @@ _GROUPS = (
 def _is_determined(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
     """Require two of focal length, f-number and aperture, or of what may stand for them."""
     known = [group for group in _GROUPS if any(name in given for name in group)]
-    if len(known) < 2:
+    if len(known) < 2 and not _is_traced(given):
         yield fault(
             (),
             "the lens is not determined: two of f_number, focal_length and aperture_diameter are "
             "needed (field_of_view may stand for focal_length, numerical_aperture for f_number)",
             "add for example focal_length: 3.2 mm" if known else "add f_number and focal_length",
         )
+
+
+def _is_traced(given: Mapping[str, Any]) -> bool:
+    """Return whether the lens is given by its prescription."""
+    return given.get("prescription") not in (None, "none")
+
+
+def _traced_alone(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
+    """Refuse beside a prescription what follows from it."""
+    if not _is_traced(given):
+        return
+    for name in (*(n for group in _GROUPS for n in group), "exit_pupil_distance"):
+        if given.get(name) not in (None, "auto"):
+            message = "cannot be given beside prescription, from which it follows"
+            remedy = f"remove {name}; prescription: {{use: NAME, scale: 0.1, f_number: 4}} sets it"
+            yield fault((name,), message, remedy, given[name])
+    for name in ("zernike", "psf", "mtf"):
+        if given.get(name) not in (None, "none") and not _neutral(name, given[name]):
+            message = "cannot be given beside prescription, which has all aberrations in it"
+            yield fault((name,), message, f"remove {name}", given[name])
 
 
 def _measured_alone(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
@@ -226,6 +308,8 @@ def _neutral(name: str, given: Any) -> bool:
         return not given or given == Wavefront()
     if name == "focus_shift":
         return given in (None, "none")
+    if name != "defocus":
+        return False
     try:
         return bool(Quantity("length").read(given) == 0)
     except ValueError:
@@ -397,11 +481,30 @@ class Optics(Model):
         example="none",
         default=None,
     )
+    prescription: Annotated[
+        Prescription | None,
+        Either(
+            lambda given: None if given in (None, "none") else _prescription(given),
+            Literal["none"] | str | Prescription,
+            words={"none": None},
+        ),
+    ] = key(
+        "the lens by ray tracing: {file: lens.zmx}, {file: lens.yaml}, the name of a shipped lens,"
+        " or {use: NAME, scale: 0.1, f_number: 4}; focal length, f-number, pupils, wavefronts,"
+        " relative illumination, distortion and color errors follow from it",
+        example="double-gauss",
+        default=None,
+    )
     stray_light: Fraction = key(
         "fraction of the mean irradiance that is spread evenly", default=0.0
     )
 
-    rules: ClassVar[tuple[Rule, ...]] = (_is_determined, _measured_alone, one_projection)
+    rules: ClassVar[tuple[Rule, ...]] = (
+        _is_determined,
+        _measured_alone,
+        _traced_alone,
+        one_projection,
+    )
 
     @property
     def is_lens(self) -> bool:
@@ -412,3 +515,8 @@ class Optics(Model):
     def measured_blur(self) -> bool:
         """Whether the blur was measured as a whole, aberrations and diffraction in it."""
         return self.psf is not None or self.mtf is not None
+
+    @property
+    def replaces_diffraction(self) -> bool:
+        """Whether diffraction is in the lens's blur, and no factor of its own."""
+        return self.measured_blur or self.prescription is not None

@@ -22,6 +22,7 @@ from vcam_cli.camera.derived.pixel_layout import (
     detector_area,
     sampling_scale,
 )
+from vcam_cli.camera.derived.prescription import axial_area, sensor_view, traced_lens
 from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.scene.scene import Extent
 from vcam_cli.errors import Collector, bad
@@ -72,6 +73,8 @@ class Geometry:
     """Width of the scene's image where the file states the scene's extent."""
     pupil_magnification: float = 1.0
     """Diameter of the exit pupil over that of the entrance pupil, P."""
+    traced_area: float | None = None
+    """Area of a traced lens's pupil on the axis, in direction cosines [sr]."""
 
     @property
     def image_distance(self) -> float:
@@ -122,6 +125,8 @@ class Geometry:
         """
         if not self.has_lens:
             return math.pi
+        if self.traced_area is not None:
+            return self.traced_area
         return float(radiometry.irradiance_per_radiance(self.f_number, self.cone_magnification))
 
     @property
@@ -233,8 +238,8 @@ def geometry(camera: CameraModel) -> Geometry:
     assert optics and areas and pixels
     pixel, (detector, collecting) = camera.pixel, areas
     pupil = camera.optics.exit_pupil_distance
-    if pupil is None:
-        pupil = float(radiometry.image_distance(optics.focal_length, optics.magnification))
+    if pupil is None:  # one at the lens, where all that is known is that it is thin
+        pupil = (optics.pupil_magnification - optics.magnification) * optics.focal_length
     check_pupil(camera, pupil)
     return Geometry(
         focal_length=optics.focal_length,
@@ -264,6 +269,7 @@ def geometry(camera: CameraModel) -> Geometry:
         exit_pupil_distance=pupil,
         scene_width_on_sensor=_scene_width(camera, optics.scale_at(scene_distance(camera))),
         pupil_magnification=optics.pupil_magnification,
+        traced_area=_traced_area(camera),
     )
 
 
@@ -302,6 +308,13 @@ def _areas(camera: CameraModel) -> tuple[Area, Area]:
     """Return the photodetector, and the area whose light it receives."""
     found = detector_area(camera)
     return found, collecting_area(camera, found)
+
+
+def _traced_area(camera: CameraModel) -> float | None:
+    traced = traced_lens(camera)
+    if traced is None:
+        return None
+    return axial_area(sensor_view(traced, scene_distance(camera), camera.optics.defocus))
 
 
 def _scene_width(camera: CameraModel, scale: float) -> float | None:

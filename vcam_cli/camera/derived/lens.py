@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from vcam_cli.camera.derived.lattice import lattice
+from vcam_cli.camera.derived.prescription import traced_lens
 from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.optics import LEAST_F_NUMBER, MOST_F_NUMBER
 from vcam_cli.camera.sensor.pixel import AGREE
@@ -62,7 +63,9 @@ def lens(camera: CameraModel) -> Lens:
     optics, distance = camera.optics, scene_distance(camera)
     if not optics.is_lens:
         return Lens(math.inf, math.inf, 0.0, math.inf)
-    f, focus = _focal_length(camera), focus_distance(camera)
+    traced = traced_lens(camera)
+    f = traced.paraxial.focal_length if traced else _focal_length(camera)
+    focus = focus_distance(camera)
     if distance <= f:
         raise bad(
             "scene.distance",
@@ -78,6 +81,8 @@ def lens(camera: CameraModel) -> Lens:
             "focus further away, or use a shorter focal length",
         )
     m = float(radiometry.magnification(f, focus))
+    if traced:
+        return Lens(f, traced.f_number, m, focus, traced.paraxial.pupil_magnification)
     pupils = _pupil_magnification(camera, f, m)
     found: dict[str, float] = {}
     if optics.f_number is not None:

@@ -30,14 +30,14 @@ class Diffraction(RadialTransfer):
 
     name = "diffraction"
     reference = "Chen 2003, section 2.2.1; Goodman, Introduction to Fourier Optics, section 6.3"
-    absent = "optics.diffraction is false, or psf or mtf replaces it"
+    absent = "optics.diffraction is false, or psf, mtf or prescription has it"
     origin = "lens"
     largest_loss = 1.0
 
     @classmethod
     def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
         """Return the diffraction of the lens, or None where the file leaves it out."""
-        replaced = camera.optics.measured_blur and not switched_off(camera, "aberration")
+        replaced = camera.optics.replaces_diffraction and not switched_off(camera, "aberration")
         if replaced or not camera.optics.diffraction:
             return None
         return cls(geometry.f_number, geometry.cone_magnification)
