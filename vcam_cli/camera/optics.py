@@ -31,7 +31,6 @@ from vcam_cli.config.values import (
 )
 from vcam_cli.config.yaml_type import YamlType, to_yaml
 
-
 LEAST_F_NUMBER, MOST_F_NUMBER = 0.5, 1e4
 """A sharp image in air has no less than f/0.5, where the cone of light is a half space (Abbe's sine
 condition; M. Born and E. Wolf, Principles of Optics, 7th ed., 1999, section 4.5.1)."""
@@ -123,7 +122,9 @@ def _glasses(given: Any) -> tuple[tuple[str, GivenGlass], ...]:
     if isinstance(given, tuple):
         return given
     if not isinstance(given, Mapping):
-        raise ValueError(f"{describe(given)} is no mapping; write {{NBFD5: {{nd: 1.79, vd: 44.2}}}}")
+        raise ValueError(
+            f"{describe(given)} is no mapping; write {{NBFD5: {{nd: 1.79, vd: 44.2}}}}"
+        )
     names = [str(name) for name in given]
     values = read_items(given.items(), GivenGlass.model_validate)
     return tuple(zip(names, values, strict=True))

@@ -67,7 +67,7 @@ class CatalogGlass(Glass):
             else:
                 pole = term**2 if self.formula == 1 else term
                 square = square + factor * micrometers**2 / (micrometers**2 - pole)
-        return np.sqrt(square)
+        return np.asarray(np.sqrt(square))
 
     @property
     def range(self) -> tuple[float, float]:
@@ -93,7 +93,7 @@ class ModelGlass(Glass):
             - self._terms(np.array(LINE_D))[..., *(None,) * np.ndim(wavelength)]
         )
         b, c = self._constants
-        return self.nd + b * terms[0] + c * terms[1]
+        return np.asarray(self.nd + b * terms[0] + c * terms[1])
 
     @staticmethod
     def _terms(wavelength: Array) -> Array:

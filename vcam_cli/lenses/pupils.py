@@ -44,7 +44,7 @@ class Pupil:
     def area(self) -> Array:
         """Area (F, W) [sr]: of the projected solid angle; 0 where no light comes."""
         step = 2 * math.pi / self.radius.shape[-1]
-        return np.nan_to_num((self.radius**2).sum(axis=-1) * (step / 2))
+        return np.asarray(np.nan_to_num((self.radius**2).sum(axis=-1) * (step / 2)))
 
 
 def pupils(

@@ -14,8 +14,9 @@ from vcam_cli.config.lists import check_list, read_items
 from vcam_cli.config.model import FileModel, Model, Rule, exactly_one, key
 from vcam_cli.config.quantities import Number, Quantity
 from vcam_cli.config.validation_messages import describe, failure, fault
-from vcam_cli.config.values import Choice, Either, Switch, Text, Wavelength, Word, to_yaml
+from vcam_cli.config.values import Choice, Either, Switch, Text, Wavelength, Word
 from vcam_cli.config.yaml_tree import Node
+from vcam_cli.config.yaml_type import to_yaml
 from vcam_cli.errors import BadInput, Problem
 from vcam_cli.lenses import glasses
 from vcam_cli.lenses.aperture import Aperture, pupil_diameter

@@ -15,7 +15,8 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.lenses.fields import View
 from vcam_cli.lenses.pupils import beam_edges
-from vcam_cli.physics import shaped_pupil, zernike
+from vcam_cli.physics import shaped_pupil
+from vcam_cli.physics.pupil_harmonics import lagrange
 from vcam_cli.physics.shaped_pupil import Mask, OtfGrid
 
 ORDER = 12
@@ -48,7 +49,7 @@ class FieldWavefronts:
     wavenumbers: Array
     """Traced (W,), rising [1/m]."""
     terms: Array
-    """Coefficients (F, W, T) of the polynomials of `indices(ORDER)` over the frame [m]."""
+    """Coefficients (F, W, T) of the polynomials of `exponents(ORDER)` over the frame [m]."""
     half_frames: Array
     """Half width and half height of the frame (F, W, 2), direction cosines."""
     edges: Array
@@ -56,7 +57,7 @@ class FieldWavefronts:
     farthest: Array
     """Landing point furthest from the chief ray's (F,) [m]."""
     typical: Array
-    """Distance within which 90 % of the rays land (F,) [m]."""
+    """Distance within which 90 % of the rays land (F, W) [m]."""
     residual: Array
     """What the polynomials leave of the paths, rms (F,) [m]."""
     lost: Array
@@ -68,7 +69,7 @@ class FieldWavefronts:
         x, y = self.edges[:, 0], self.edges[:, 1]
         box = (x * np.roll(y, -1, 1) - y * np.roll(x, -1, 1)).sum(axis=1) / 2
         middle = self.half_frames[:, self.half_frames.shape[1] // 2]
-        return np.abs(box) * middle[:, 0] * middle[:, 1]
+        return np.asarray(np.abs(box) * middle[:, 0] * middle[:, 1])
 
     def at(self, place: int) -> PlaceWavefront:
         """Return what is known of one image point."""
@@ -84,9 +85,7 @@ class PlaceWavefront:
 
     def _between(self, values: Array, wavelength: float) -> Array:
         """Return values (W, ...) of the traced wavelengths at another one."""
-        return np.asarray(
-            np.tensordot(_lagrange(self.field.wavenumbers, 1 / wavelength), values, 1)
-        )
+        return np.asarray(np.tensordot(lagrange(self.field.wavenumbers, 1 / wavelength), values, 1))
 
     def terms(self, wavelength: float) -> Array:
         """Return the coefficients (T,) at a wavelength [m]."""
@@ -99,17 +98,27 @@ class PlaceWavefront:
     @cached_property
     def slope(self) -> float:
         """Largest slope of the wavefronts, tilt among it [m per half frame]."""
-        listed = shaped_pupil.indices(ORDER)
         at = np.linspace(-1, 1, 41)
-        x, y = np.meshgrid(at, at)
-        inside = self._inside(x, y)
-        found = 0.0
-        for terms in self.field.terms[self.place]:
-            both = zernike.gradient(tuple(zip(listed, terms, strict=True)), x[inside], y[inside])
-            found = max(found, float(np.hypot(*both).max()))
-        return found
+        x, y = (a.ravel() for a in np.meshgrid(at, at))
+        inside = self.contains(x, y)
+        found = (
+            shaped_pupil.slopes(terms, ORDER, x[inside], y[inside])
+            for terms in self.field.terms[self.place]
+        )
+        return max(float(np.hypot(*both).max()) for both in found)
 
-    def _inside(self, x: Array, y: Array) -> Array:
+    def deformation(self, wavelength: float) -> float:
+        """Return the rms of the wavefront over the pupil, piston and tilt aside [m]."""
+        at = np.linspace(-1, 1, 41)
+        x, y = (a.ravel() for a in np.meshgrid(at, at))
+        inside = self.contains(x, y)
+        path = shaped_pupil.basis(x[inside], y[inside], ORDER) @ self.terms(wavelength)
+        plane = np.stack([np.ones(len(path)), x[inside], y[inside]], axis=1)
+        rest = path - plane @ np.linalg.lstsq(plane, path, rcond=None)[0]
+        return float(np.sqrt(np.mean(rest**2)))
+
+    def contains(self, x: Array, y: Array) -> Array:
+        """Return whether places of the frame lie in the pupil."""
         edge_x, edge_y = self.field.edges[self.place]
         middle = (edge_x.max() + edge_x.min()) / 2
         angle = np.arctan2(edge_y, edge_x - middle)
@@ -120,12 +129,11 @@ class PlaceWavefront:
 
     def mask(self, samples: int) -> Mask:
         """Return the pupil's shape on a grid of its frame."""
-        return shaped_pupil.mask(self._inside, samples)
+        return shaped_pupil.mask(self.contains, samples)
 
-    def grid(self, wavelength: float, samples: int, pupil: Mask | None = None) -> OtfGrid:
-        """Return the OTF at a wavelength over lags in half frames."""
-        shape = self.mask(samples) if pupil is None else pupil
-        return shaped_pupil.otf_grid(shape, self.terms(wavelength) / wavelength, ORDER)
+    def grid(self, wavelength: float, pupil: Mask, farthest: float = 2.0) -> OtfGrid:
+        """Return the OTF at a wavelength over lags in half frames, up to one of them."""
+        return shaped_pupil.otf_grid(pupil, self.terms(wavelength) / wavelength, ORDER, farthest)
 
     def cutoff(self, wavelength: float) -> float:
         """Return a frequency from which nothing is left [cycles/m]."""
@@ -211,7 +219,7 @@ def trace_field(
     wide = _extent(front.x, alive), _extent(front.y, alive)
     scale = np.stack([(w / w[:, -1:])[:, :-1] for w in wide], axis=-1)
     half_frames = np.stack([half_x, half_y], axis=-1)[:, None] * scale
-    count = len(shaped_pupil.indices(ORDER))
+    count = len(shaped_pupil.exponents(ORDER))
     terms = np.zeros((len(heights), len(wavelengths), count))
     left = np.zeros(len(heights))
     for f in range(len(heights)):
@@ -231,7 +239,7 @@ def trace_field(
         half_frames,
         edges,
         MARGIN * lands.max(axis=(1, 2)),
-        np.quantile(lands, 0.9, axis=(1, 2)),
+        np.quantile(lands[:, :-1], 0.9, axis=2),
         left,
         1 - alive.mean(axis=(1, 2)),
     )
@@ -239,8 +247,7 @@ def trace_field(
 
 def _fit(x: Array, y: Array, path: Array, weight: Array) -> tuple[Array, float]:
     """Return the coefficients of the polynomials even in y, and the rms that they leave."""
-    rho, theta = np.hypot(x, y), np.arctan2(y, x)
-    columns = np.array([zernike.polynomial(j, rho, theta) for j in shaped_pupil.indices(ORDER)]).T
+    columns = shaped_pupil.basis(x, y, ORDER)
     root = np.sqrt(weight / weight.sum())[:, None]
     found = np.linalg.lstsq(columns * root, path * root[:, 0], rcond=1e-9)[0]
     return found, float(np.sqrt(((columns @ found - path) ** 2 * root[:, 0] ** 2).sum()))
@@ -268,11 +275,4 @@ def _nodes(low: float, high: float) -> Array:
     if high <= low * (1 + 1e-9):
         return np.array([low])
     angle = (np.arange(WAVELENGTHS) + 0.5) * (math.pi / WAVELENGTHS)
-    return (low + high) / 2 - (high - low) / 2 * np.cos(angle)
-
-
-def _lagrange(nodes: Array, at: float) -> Array:
-    """Return the weights of values at nodes in the polynomial through them."""
-    apart = (at - nodes)[None, :] * ~np.eye(len(nodes), dtype=bool) + np.eye(len(nodes))
-    own = nodes[:, None] - nodes + np.eye(len(nodes))
-    return np.asarray(np.prod(apart / own, axis=1))
+    return np.asarray((low + high) / 2 - (high - low) / 2 * np.cos(angle))

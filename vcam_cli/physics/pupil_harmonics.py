@@ -64,7 +64,7 @@ class PupilHarmonics:
         ndarray of complex
             A_m (n, m) [dimensionless]; 0 from the cut-off on.
         """
-        series = np.tensordot(_lagrange(self.wavenumbers, 1 / wavelength), self.series, axes=1)
+        series = np.tensordot(lagrange(self.wavenumbers, 1 / wavelength), self.series, axes=1)
         inside = h < 1
         at = np.polynomial.chebyshev.chebvander(2 * np.where(inside, h, 0.0) - 1, len(series) - 1)
         return np.asarray((at * inside[:, None]) @ series)
@@ -195,8 +195,8 @@ def _chebyshev(values: Array) -> Array:
     return coefficients
 
 
-def _lagrange(nodes: Floats, at: float) -> Floats:
-    """Return the weights of values at the nodes in the polynomial through them."""
+def lagrange(nodes: Floats, at: float) -> Floats:
+    """Return the weights of values at nodes (n,) in the polynomial through them."""
     weights = np.ones(len(nodes))
     for i, own in enumerate(nodes):
         for j, node in enumerate(nodes):

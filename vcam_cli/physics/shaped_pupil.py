@@ -14,30 +14,58 @@ splines interpolate what differs from the OTF of a disk, whose cusp at 0 they wo
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.physics import diffraction, zernike
+from vcam_cli.physics import diffraction
 
-FEWEST, MOST = 128, 1024
+FEWEST, MOST = 128, 640
 """Samples across a pupil."""
 PER_RADIAN, PER_ROOT_RADIAN = 3.4, 25.0
 """Samples for each radian of phase that half a pupil holds at its steepest place, and for the
 square root of those radians: what `pupil_grid` needs for 1e-4 of the light, and half of that."""
+LEAST_PER_RADIAN = 1.36
+"""Samples a radian of steeper wavefronts, for which `MOST` are too few; 0.64 would alias."""
 PARTS = 8
 """Parts along each side that a cell at the edge is cut into."""
 MIRRORED_LAGS = 12
 """Lags kept on the far side of the axis, where the spline's coefficients have to settle."""
 
 
-def indices(order: int) -> tuple[int, ...]:
-    """Return the Noll indices up to a radial order of the polynomials that are even in y."""
-    count = (order + 1) * (order + 2) // 2
-    return tuple(j for j in range(1, count + 1) if zernike.noll_orders(j)[1] >= 0)
+def exponents(order: int) -> tuple[tuple[int, int], ...]:
+    """Return the degrees (i, j) of the polynomials P_i(x) P_j(y) of a wavefront even in y.
+
+    Legendre's, with i + j at most `order`: on a grid they are evaluated axis by axis.
+    """
+    return tuple((i, j) for j in range(0, order + 1, 2) for i in range(order + 1 - j))
+
+
+def basis(x: Array, y: Array, order: int) -> Array:
+    """Return the polynomials (..., T) of `exponents(order)` at places of the frame."""
+    vander = np.polynomial.legendre.legvander
+    along, across = vander(x, order), vander(y, order)
+    return np.stack([along[..., i] * across[..., j] for i, j in exponents(order)], axis=-1)
+
+
+def tensor(terms: Array, order: int) -> Array:
+    """Return the coefficients (order + 1, order + 1) over the degrees in x and in y."""
+    found = np.zeros((order + 1, order + 1))
+    for value, (i, j) in zip(terms.tolist(), exponents(order), strict=True):
+        found[i, j] = value
+    return found
+
+
+def slopes(terms: Array, order: int, x: Array, y: Array) -> tuple[Array, Array]:
+    """Return dW/dx and dW/dy at places of the frame [unit of the terms per half frame]."""
+    legendre = np.polynomial.legendre
+    whole = tensor(terms, order)
+    return (
+        legendre.legval2d(x, y, legendre.legder(whole, axis=0)),
+        legendre.legval2d(x, y, legendre.legder(whole, axis=1)),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,17 +135,7 @@ def samples_across(slope: float) -> int:
     """Return the samples for a wavefront's largest slope [wavelengths per half frame]."""
     radians = 2 * math.pi * slope
     wanted = max(FEWEST, PER_RADIAN * radians, PER_ROOT_RADIAN * math.sqrt(radians))
-    return min(32 * math.ceil(wanted / 32), MOST)
-
-
-@lru_cache(maxsize=8)
-def _basis(samples: int, order: int) -> Array:
-    """Return the polynomials (T, n, n) of `indices` on the grid."""
-    at = _places(samples)
-    x, y = np.meshgrid(at, at)
-    rho, theta = np.hypot(x, y), np.arctan2(y, x)
-    found = np.array([zernike.polynomial(j, rho, theta) for j in indices(order)])
-    return found.astype(np.float32)
+    return 32 * math.ceil(max(min(wanted, MOST), LEAST_PER_RADIAN * radians) / 32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,11 +147,8 @@ class OtfGrid:
     """Radius of that disk."""
     spline: Array
     """Complex coefficients (rows, columns); the lag 0 is at (rows // 2, MIRRORED_LAGS)."""
-
-    @property
-    def nbytes(self) -> int:
-        """Memory that the coefficients take [bytes]."""
-        return self.spline.nbytes
+    farthest: float
+    """Lag along each axis up to which it is known; from 2 on there is nothing."""
 
     def interpolate(self, sx: Array, sy: Array) -> Array:
         """Return the OTF at any lags [half frames], which broadcast; 1 at 0."""
@@ -141,7 +156,7 @@ class OtfGrid:
 
         sx, sy = np.broadcast_arrays(np.atleast_1d(sx), sy)
         length = np.hypot(sx, sy)
-        inside = (np.abs(sx) <= 2) & (np.abs(sy) <= 2)
+        inside = (np.abs(sx) <= self.farthest) & (np.abs(sy) <= self.farthest)
         left = (sx < 0) | ((sx == 0) & (sy < 0))
         sign = np.where(left, -1, 1) / self.step
         row = np.where(inside, sign * sy, 0) + self.spline.shape[0] // 2
@@ -154,18 +169,12 @@ class OtfGrid:
         return otf
 
 
-def mixed(grids: Sequence[OtfGrid], shares: Array) -> OtfGrid:
-    """Return the weighted sum of grids of one size, whose shares sum to 1."""
-    spline = sum(g.spline * np.float32(s) for g, s in zip(grids, shares, strict=True))
-    return replace(grids[0], spline=np.asarray(spline))
-
-
 def _disk(lag: Array) -> Array:
     """Return the OTF of a disk at lags in its diameters."""
     return np.asarray(diffraction.otf_circular(lag, 1.0, 1.0))
 
 
-def otf_grid(pupil: Mask, waves: Array, order: int) -> OtfGrid:
+def otf_grid(pupil: Mask, waves: Array, order: int, farthest: float = 2.0) -> OtfGrid:
     """Return the OTF of a pupil with a wavefront.
 
     Parameters
@@ -173,9 +182,11 @@ def otf_grid(pupil: Mask, waves: Array, order: int) -> OtfGrid:
     pupil : Mask
         Its shape.
     waves : ndarray
-        Coefficients (T,) of the polynomials of `indices(order)` over the frame [wavelengths].
+        Coefficients (T,) of the polynomials of `exponents(order)` over the frame [wavelengths].
     order : int
-        Their highest radial order.
+        Their highest order.
+    farthest : float
+        Lag along each axis up to which the OTF is wanted [half frames].
 
     Returns
     -------
@@ -186,22 +197,25 @@ def otf_grid(pupil: Mask, waves: Array, order: int) -> OtfGrid:
     from scipy.ndimage import spline_filter
 
     samples = pupil.samples
-    turns = np.tensordot(waves.astype(np.float32), _basis(samples - 2, order), 1)
-    turns -= np.rint(turns)
-    field = np.empty(turns.shape, np.complex64)
-    np.cos(2 * np.pi * turns, out=field.real)
-    np.sin(2 * np.pi * turns, out=field.imag)
+    vander = np.polynomial.legendre.legvander(_places(samples - 2), order)
+    turns = (vander @ tensor(waves, order).T @ vander.T).astype(np.float64)
+    phase = (2 * np.pi * (turns - np.rint(turns))).astype(np.float32)
+    field = np.empty(phase.shape, np.complex64)
+    np.cos(phase, out=field.real)
+    np.sin(phase, out=field.imag)
     field *= pupil.weights
-    size = fft.next_fast_len(2 * samples)
+    most = min(math.ceil(farthest / pupil.step) + MIRRORED_LAGS, samples)
+    size = fft.next_fast_len(samples + most)
     spectrum = fft.fft2(field, (size, size))
     power = spectrum.real**2 + spectrum.imag**2
     # of a real function only half of the lags are needed; those to the left are conjugate
-    lags = fft.rfft2(power)[:, : samples + 1] / np.float32(size**2 * pupil.weights.sum())
-    otf = np.concatenate([lags[-samples:], lags[: samples + 1]])
-    otf[samples, 0] = 1.0
+    lags = fft.rfft2(power)[:, : most + 1] / np.float32(size**2 * pupil.weights.sum())
+    otf = np.concatenate([lags[-most:], lags[: most + 1]])
+    otf[most, 0] = 1.0
     disk = math.sqrt(pupil.share)
-    at = np.arange(-samples, samples + 1) * pupil.step
-    otf -= _disk(np.hypot(at[:, None], at[samples:]) / (2 * disk)).astype(np.float32)
+    at = np.arange(-most, most + 1) * pupil.step
+    otf -= _disk(np.hypot(at[:, None], at[most:]) / (2 * disk)).astype(np.float32)
     left = otf[::-1, MIRRORED_LAGS:0:-1].conj()
     whole = np.concatenate([left, otf], axis=1)
-    return OtfGrid(pupil.step, disk, spline_filter(whole, 3, output=np.complex64))
+    known = farthest if most < samples else 2.0
+    return OtfGrid(pupil.step, disk, spline_filter(whole, 3, output=np.complex64), known)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vcam_cli.camera.derived.geometry import Geometry, geometry
+from vcam_cli.camera.derived.prescription import illumination, sensor_view, traced_lens
 from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.optics import FalloffFile
 from vcam_cli.errors import bad, data_file_problems
@@ -25,15 +26,22 @@ class Falloff:
     """Distances from the axis, rising from 0 [m]."""
     values: tuple[float, ...]
     """Illumination relative to the axis: the first is 1."""
+    is_traced: bool = False
+    """Whether it is that of a traced lens, not a measured one."""
 
 
 def falloff(camera: CameraModel, geometry: Geometry) -> Falloff | None:
-    """Return the table that `optics.off_axis` names; None where it names none.
+    """Return the table that `optics.off_axis` names, or a traced lens's; None where there is none.
 
     Raises BadInput for a file that cannot be read, is no such table, or ends before the corner of
     the array.
     """
     given = camera.optics.off_axis
+    if given == "exact" and (lens := traced_lens(camera)):
+        view = sensor_view(lens, geometry.object_distance, camera.optics.defocus)
+        corner = float(np.hypot(geometry.sensor_width, geometry.sensor_height)) / 2
+        traced = illumination(view, corner)
+        return Falloff(traced.heights, traced.values, is_traced=True)
     if not isinstance(given, FalloffFile):
         return None
     heights, values = _table(given.file)

@@ -194,8 +194,8 @@ class FieldTable:
 
     heights: tuple[float, ...]
     """[m]"""
-    illumination: tuple[float, ...]
-    """Relative to the axis."""
+    values: tuple[float, ...]
+    """What the table is of."""
 
 
 @lru_cache(maxsize=32)

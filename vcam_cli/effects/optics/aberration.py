@@ -9,6 +9,7 @@ wavefront. A measured PSF has its Fourier transform for H, a measured MTF its ow
 less. Which kind of blur a camera has depends on its file:
 
     point_spread.py     a point spread function, measured or from a lens program
+    traced_blur.py      wavefronts of a lens that is given by its prescription
     measured_mtf.py     a measured modulation transfer, the same everywhere or over the field
     field_blur.py       a wavefront that changes over the field, or turns with the azimuth
     wavefront_blur.py   a wavefront that is the same everywhere, symmetric about the axis or not
@@ -21,6 +22,7 @@ from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.optics.field_blur import FieldBlur
 from vcam_cli.effects.optics.measured_mtf import FieldMtf, MeasuredMtf
 from vcam_cli.effects.optics.point_spread import PointSpread
+from vcam_cli.effects.optics.traced_blur import TracedBlur
 from vcam_cli.effects.optics.wavefront_blur import (
     AberrationBlur,
     DirectedBlur,
@@ -32,7 +34,9 @@ from vcam_cli.effects.optics.wavefront_blur import (
 from vcam_cli.errors import bad
 from vcam_cli.physics import aberration, zernike
 
-KINDS = (PointSpread, MeasuredMtf, FieldMtf, SymmetricBlur, DirectedBlur, FieldBlur)
+KINDS = (
+    TracedBlur, PointSpread, MeasuredMtf, FieldMtf, SymmetricBlur, DirectedBlur, FieldBlur
+)  # fmt: skip
 """Kinds of blur; a camera has at most one of them."""
 
 
@@ -62,6 +66,16 @@ def check(camera: Camera, geometry: Geometry) -> None:
             "a measured blur is that of what is in focus, and not known at other distances",
             "write psf: none and mtf: none, or put the scene in focus",
         )
+    if traced := TracedBlur.from_camera(camera, geometry):
+        try:
+            traced.check()
+        except ValueError as error:
+            remedy = (
+                "stop down by {use: NAME, f_number: 8}, use a smaller scale, or write"
+                " diffraction: false for the blur of rays"
+            )
+            raise bad(("optics", "prescription"), str(error), remedy) from None
+        return
     if camera.optics.measured_blur or not Lens.from_camera(camera, geometry).diffracts:
         return
     shortest = camera.scene.wavelengths.start

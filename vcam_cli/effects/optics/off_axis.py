@@ -52,7 +52,8 @@ class OffAxis(Gain):
         if camera.optics.off_axis == "none":
             return None
         if measured := falloff(camera, geometry):
-            return MeasuredFalloff(measured.heights, measured.values, *half)
+            source = "traced" if measured.is_traced else "measured"
+            return MeasuredFalloff(measured.heights, measured.values, *half, source)
         tan2_cone = 1 / (4 * geometry.working_f_number**2)
         model = "cos4" if camera.optics.off_axis == "cos4" else "exact"
         return cls(model, tan2_cone, geometry.image_distance, *half)
@@ -120,6 +121,7 @@ class MeasuredFalloff(Gain):
     half_width: float
     half_height: float
     """Half the sensor's width and height [m]."""
+    origin_of_points: str = "measured"
 
     name = OffAxis.name
     reference = "ISO 13653:1996, relative illuminance in the image field, as measured"
@@ -137,7 +139,9 @@ class MeasuredFalloff(Gain):
         """Return a short clause with this camera's numbers and units."""
         corner = float(self._relative_illumination(np.hypot(self.half_width, self.half_height)))
         kind = "darker" if corner <= 1 else "brighter"
-        return f"measured: corners {100 * abs(1 - corner):.3g} % {kind} than the center"
+        return (
+            f"{self.origin_of_points}: corners {100 * abs(1 - corner):.3g} % {kind} than the center"
+        )
 
     def _relative_illumination(self, radius: Array | float) -> Array:
         return np.asarray(np.interp(radius, self.heights, self.values))

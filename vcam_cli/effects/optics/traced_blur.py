@@ -1,0 +1,296 @@
+"""Blur of a lens that is traced: wavefronts by field and wavelength on its true pupils.
+
+It is the full transfer function, diffraction in it. With diffraction switched off the same
+wavefronts throw rays: a ray lands dW/dx beside the chief ray's point, x in direction cosines.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from threading import Lock
+
+import numpy as np
+
+from vcam_cli.arrays import Array
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.camera.derived.prescription import sensor_view, traced_lens, wavefronts
+from vcam_cli.effects.base import FieldTransfer, PlaneTransfer, Zone, switched_off
+from vcam_cli.effects.optics.field_blur import ZoneWeight
+from vcam_cli.effects.optics.wavefront_blur import GREEN, AberrationBlur, largest_loss
+from vcam_cli.lenses.fields import View
+from vcam_cli.lenses.wavefronts import ORDER, PlaceWavefront
+from vcam_cli.physics import shaped_pupil
+from vcam_cli.physics.aberration import MAX_SLOPE
+from vcam_cli.physics.pupil_harmonics import direction_harmonics, lagrange
+from vcam_cli.physics.shaped_pupil import OtfGrid
+
+FEWEST_PLACES, MOST_PLACES = 5, 9
+"""Places from center to corner between which transfer functions are polynomials."""
+PLACES_PER_WAVE = 3.0
+"""Further places for each wave by which the rms of the wavefront changes."""
+MOST_CYCLES = 16.0
+"""Frequency times the blur's radius from which nothing is taken to be left: of an evenly filled
+disk it is a thousandth."""
+RAYS = 48
+"""Rays across a pupil where they are traced without diffraction."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlaceBlur(AberrationBlur, PlaneTransfer):
+    """The blur of a traced lens in one place, turned about the axis by an angle [rad]."""
+
+    wavefront: PlaceWavefront
+    diffracts: bool
+    longest: float
+    shortest: float
+    """Range of wavelengths that it is asked for [m]."""
+    angle: float = 0.0
+    kept: dict[float, OtfGrid] = field(default_factory=dict)
+    """Grids by wavelength, shared by all angles."""
+    lock: Lock = field(default_factory=Lock)
+
+    @classmethod
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> None:
+        """Return None: a camera has `TracedBlur`."""
+        return None
+
+    def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
+        waves = self.wavefront.deformation(GREEN) / GREEN
+        known = self.wavefront.field
+        nearest = int(np.abs(1 / known.wavenumbers - GREEN).argmin())
+        width = 2 * float(known.typical[self.wavefront.place, nearest])
+        return f"{waves:.3g} waves rms at 550 nm, blurs points to {width * 1e6:.3g} um"
+
+    @property
+    def typical(self) -> float:
+        """Radius that 90 % of the rays land in, at the worst wavelength [m]."""
+        return float(self.wavefront.field.typical[self.wavefront.place].max())
+
+    @property
+    def reach(self) -> float:
+        """How far from its place it throws almost all of the light [m]."""
+        airy = 2 * GREEN / self._width if self.diffracts else 0.0
+        return self.typical + airy
+
+    @property
+    def _width(self) -> float:
+        return float(2 * self.wavefront.half_frame(GREEN).min())
+
+    def spread(self, wavelengths: Array) -> Array:
+        """Return a bound (J,) on |1 - H(f)| / (2 pi |f|) at wavelengths (J,) [m]."""
+        farthest = float(self.wavefront.field.farthest[self.wavefront.place])
+        if not self.diffracts:
+            return np.full(len(wavelengths), farthest)
+        return np.array([self.wavefront.spread(w) for w in wavelengths.tolist()])
+
+    def cutoff(self, wavelength: float) -> float:
+        """Return the frequency from which the transfer is zero, or counts as zero [cycles/m]."""
+        known = self.wavefront.field
+        node = int(np.abs(1 / known.wavenumbers - wavelength).argmin())
+        rays = self._blurred_out(node)
+        return min(self.wavefront.cutoff(wavelength), rays) if self.diffracts else rays
+
+    def _blurred_out(self, node: int) -> float:
+        """Return the frequency from which rays of a traced wavelength leave nothing [cycles/m]."""
+        radius = float(self.wavefront.field.typical[self.wavefront.place, node])
+        return MOST_CYCLES / max(radius, 1e-8)
+
+    def otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
+        """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: complex (m, n)."""
+        return self._turned(fx[None, :], fy[:, None], wavelength)
+
+    def otf_along(self, frequency: Array, across: tuple[float, float], wavelength: float) -> Array:
+        """Return the transfer (n,) of waves in one direction."""
+        return self._turned(across[0] * frequency, across[1] * frequency, wavelength)
+
+    def harmonics(self, frequency: Array, wavelengths: Array) -> Array:
+        """Return the transfer (J, n, m) as harmonics of the direction, for the angle 0."""
+
+        def values(angles: Array) -> Array:
+            fx, fy = (np.multiply.outer(frequency, along(angles)) for along in (np.cos, np.sin))
+            return np.array([self._at_node(fx, fy, node) for node in range(len(self._nodes))])
+
+        found = direction_harmonics(values)
+        shares = np.array([lagrange(self._nodes, 1 / w) for w in wavelengths.tolist()])
+        between = np.tensordot(shares, found, 1)
+        for part, wavelength in zip(between, wavelengths.tolist(), strict=True):
+            part[frequency >= self.cutoff(wavelength)] = 0
+        return np.asarray(between)
+
+    def mean_error(self, signal) -> float:  # type: ignore[no-untyped-def]
+        """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
+        return largest_loss(self, 0.999 * self.cutoff(GREEN)) * float(signal.full_signal)
+
+    def _turned(self, fx: Array, fy: Array, wavelength: float) -> Array:
+        cos, sin = math.cos(self.angle), math.sin(self.angle)
+        return self._still(cos * fx + sin * fy, cos * fy - sin * fx, wavelength)
+
+    def _still(self, fx: Array, fy: Array, wavelength: float) -> Array:
+        """Return the transfer at frequencies that broadcast, for the angle 0.
+
+        At one frequency it is smooth in the wavelength: rays land where they do.
+        """
+        shares = lagrange(self._nodes, 1 / wavelength)
+        total = sum(
+            share * self._at_node(fx, fy, node) for node, share in enumerate(shares.tolist())
+        )
+        return np.where(np.hypot(fx, fy) < self.cutoff(wavelength), total, 0.0)
+
+    @cached_property
+    def _nodes(self) -> Array:
+        """Wavenumbers at which it is computed."""
+        return self.wavefront.field.wavenumbers
+
+    def _at_node(self, fx: Array, fy: Array, node: int) -> Array:
+        """Return the transfer at a traced wavelength; 0 where rays leave nothing."""
+        wavelength = 1 / float(self._nodes[node])
+        inside = np.hypot(fx, fy) < self._blurred_out(node)
+        fx, fy = np.where(inside, fx, 0.0), np.where(inside, fy, 0.0)
+        found = (self._by_waves if self.diffracts else self._by_rays)(fx, fy, wavelength)
+        return np.where(inside, found, 0.0)
+
+    def _by_waves(self, fx: Array, fy: Array, wavelength: float) -> Array:
+        half = self.wavefront.half_frame(wavelength)
+        sx, sy = wavelength * fx / half[0], wavelength * fy / half[1]
+        farthest = max(float(np.abs(sx).max()), float(np.abs(sy).max()))
+        return self._grid(wavelength, min(farthest, 2.0)).interpolate(sx, sy)
+
+    def _grid(self, wavelength: float, farthest: float) -> OtfGrid:
+        """Return the OTF at a wavelength, over lags as far as any that was asked for."""
+        with self.lock:
+            kept = self.kept.get(wavelength)
+            if kept is None or kept.farthest < farthest:
+                kept = self.wavefront.grid(wavelength, self._mask, min(1.05 * farthest, 2.0))
+                self.kept[wavelength] = kept
+            return kept
+
+    @cached_property
+    def _mask(self) -> shaped_pupil.Mask:
+        return self.wavefront.mask(
+            shaped_pupil.samples_across(self.wavefront.slope / self.shortest)
+        )
+
+    def _by_rays(self, fx: Array, fy: Array, wavelength: float) -> Array:
+        """Return the mean of exp(-2 pi i f . r) over rays that land at r."""
+        x, y = self._landings(wavelength)
+        fx, fy = np.broadcast_arrays(fx, fy)
+        out = np.empty(fx.size, np.complex128)
+        for i in range(0, fx.size, 256):
+            some = slice(i, i + 256)
+            turns = np.outer(fx.ravel()[some], x) + np.outer(fy.ravel()[some], y)
+            out[some] = np.exp(-2j * np.pi * turns).mean(axis=1)
+        return out.reshape(fx.shape)
+
+    def _landings(self, wavelength: float) -> tuple[Array, Array]:
+        at = np.linspace(-1, 1, RAYS + 1)[:-1] + 1 / RAYS
+        x, y = (a.ravel() for a in np.meshgrid(at, at))
+        inside = self.wavefront.contains(x, y)
+        terms = self.wavefront.terms(wavelength)
+        slopes = shaped_pupil.slopes(terms, ORDER, x[inside], y[inside])
+        half = self.wavefront.half_frame(wavelength)
+        return slopes[0] / half[0], slopes[1] / half[1]
+
+
+@dataclass(frozen=True)
+class TracedBlur(AberrationBlur, FieldTransfer):
+    """A traced lens: its blur at places from the center to the corner."""
+
+    view: View
+    half_diagonal: float
+    """Half the diagonal of the sensor [m]."""
+    shortest: float
+    longest: float
+    """Range of wavelengths [m]."""
+    diffracts: bool
+
+    reference = "traced: Welford 1986, chapters 4 and 7; Hopkins 1985, doi:10.1364/AO.24.002491"
+
+    @classmethod
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> TracedBlur | None:
+        """Return the blur of a lens given by its prescription, else None."""
+        traced = traced_lens(camera)
+        if traced is None:
+            return None
+        view = sensor_view(traced, geometry.object_distance, camera.optics.defocus)
+        half_diagonal = math.hypot(geometry.sensor_width, geometry.sensor_height) / 2
+        band = camera.scene.wavelengths
+        diffracts = camera.optics.diffraction and not switched_off(camera, "diffraction")
+        return cls(view, half_diagonal, band.start, band.stop, diffracts)
+
+    def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
+        center, *_, corner = self._places(FEWEST_PLACES)
+        return (
+            f"{self.view.lens.name}, traced: center {center.describe()}; corner {corner.describe()}"
+        )
+
+    @property
+    def reach(self) -> float:
+        """How far from its place the blur throws almost all of the light [m]."""
+        return max(place.reach for place in self._places(FEWEST_PLACES))
+
+    def spread(self, wavelengths: Array) -> Array:
+        """Return a bound (J,) on |1 - H(f)| / (2 pi |f|) at the places that are traced [m]."""
+        places = self._places(MOST_PLACES)
+        return np.asarray(np.max([place.spread(wavelengths) for place in places], axis=0))
+
+    def check(self) -> None:
+        """Raise BadInput where no image is formed, ValueError for too steep a wavefront."""
+        if not self.diffracts:
+            return
+        steepest = max(p.wavefront.slope for p in self._places(FEWEST_PLACES)) / self.shortest
+        if steepest > MAX_SLOPE:
+            raise ValueError(
+                f"gives a wavefront that rises by {steepest:.4g} wavelengths of"
+                f" {self.shortest * 1e9:.4g} nm over a pupil radius; at most {MAX_SLOPE:g} can be"
+                " followed"
+            )
+
+    def rings(self, count: int) -> tuple[Zone, ...]:
+        """Return blurs at Chebyshev's points from center to corner, whose weights sum to 1."""
+        places = self._places(self._enough(count))
+        nodes = tuple((p.wavefront.field.heights[p.wavefront.place] / self.half_diagonal)
+                      for p in places)  # fmt: skip
+        return tuple(
+            Zone(place, ZoneWeight((nodes,), node, 0, 0, self.half_diagonal))
+            for place, node in zip(places, nodes, strict=True)
+        )
+
+    def zones(self, count: int) -> tuple[Zone, ...]:
+        """Return the rings cut into sectors, in each of which the blur is turned."""
+        around = 4 * math.ceil((4 * (self._enough(count) - 1) + 1) / 4)
+        return tuple(
+            Zone(
+                replace(ring.blur, angle=2 * math.pi * sector / around),  # type: ignore[type-var]
+                replace(ring.weight, sector=sector, around=around),  # type: ignore[type-var]
+            )
+            for ring in self.rings(count)
+            for sector in range(around)
+        )
+
+    def _enough(self, count: int) -> int:
+        few = self._places(FEWEST_PLACES)
+        rms = np.array([place.wavefront.deformation(GREEN) for place in few]) / GREEN
+        waves = float(np.abs(np.diff(rms)).sum())
+        wanted = max(count, FEWEST_PLACES) + math.ceil(PLACES_PER_WAVE * waves)
+        return min(wanted, max(count, MOST_PLACES))
+
+    def _places(self, count: int) -> tuple[PlaceBlur, ...]:
+        """Return the blur at so many places, traced once for each count."""
+        if count not in self._kept:
+            at = (1 - np.cos(np.pi * np.arange(count) / (count - 1))) / 2
+            heights = tuple((self.half_diagonal * at).tolist())
+            found = wavefronts(self.view, heights, self.shortest, self.longest)
+            self._kept[count] = tuple(
+                PlaceBlur(found.at(i), self.diffracts, self.longest, self.shortest)
+                for i in range(count)
+            )
+        return self._kept[count]
+
+    @cached_property
+    def _kept(self) -> dict[int, tuple[PlaceBlur, ...]]:
+        return {}
