@@ -38,6 +38,7 @@ KEYS: Mapping[str, str] = {
         "optics.field_of_view: 60 deg",
     ),
     "na": "optics.numerical_aperture: 0.2",
+    **dict.fromkeys(("zemax", "zmx", "lens_file"), "optics.prescription: {file: lens.zmx}"),
     "transmission": "optics.transmittance: 0.95",
     "vignetting": "optics.off_axis: exact",
     "relative_illumination": "optics.off_axis: exact",
@@ -328,10 +329,6 @@ NOT_SIMULATED: Mapping[str, str] = {
         "charge beyond the full well is drained, and spills to no neighbor",
     ),
     "smear": "charge is transferred in no time, and collects no light meanwhile",
-    **dict.fromkeys(
-        ("prescription", "zemax"),
-        "a lens is given by what it does, in optics.zernike, optics.psf or optics.mtf",
-    ),
     "flash": "the light of the scene is scene.illuminant at one level",
     **dict.fromkeys(
         ("phase_detection", "pdaf", "dual_pixel"),

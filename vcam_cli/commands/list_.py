@@ -46,7 +46,8 @@ def list_(
     """List what ships; with a NAME print the file.
 
     Kinds: cameras, parts, technologies, studies, measurements, charts, models
-    (what a picture's channels mean), illuminants, filters, effects, steps (of processing), metrics.
+    (what a picture's channels mean), illuminants, filters, lenses, effects, steps (of processing),
+    metrics.
 
     \b
     Example:
@@ -228,7 +229,8 @@ def _metrics() -> list[Item]:
 
 
 WORDS = {
-    **dict.fromkeys(("lens", "lenses", "optics", "pixels", "arrays", "scenes", "sensors"), "parts"),
+    **dict.fromkeys(("lens", "prescriptions", "prescription"), "lenses"),
+    **dict.fromkeys(("optics", "pixels", "arrays", "scenes", "sensors"), "parts"),
     **dict.fromkeys(("lamp", "lamps", "lights", "light"), "illuminants"),
     **dict.fromkeys(("spectra", "spectrum", "qe", "curves", "cfa"), "filters"),
     **dict.fromkeys(("processing", "isp", "pipeline"), "steps"),
@@ -247,6 +249,7 @@ KINDS: dict[str, Callable[[], list[Item]]] = {
     "models": _models,
     "illuminants": _illuminants,
     "filters": _filters,
+    "lenses": lambda: _files("lenses"),
     "effects": _effects,
     "steps": _steps,
     "metrics": _metrics,

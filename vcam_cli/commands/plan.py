@@ -43,7 +43,14 @@ Geometry = Annotated[
     ),
 ]
 
-
+LensPage = Annotated[
+    bool,
+    typer.Option(
+        "--lens",
+        help="Draw a lens that is given by optics.prescription: rays, spots, MTF, distortion,"
+        " illumination, color. Writes lens.png and lens.csv.",
+    ),
+]
 Details = Annotated[
     bool,
     typer.Option(
@@ -64,13 +71,15 @@ def plan(
     turns: Turns = None,
     out: options.Out = None,
     geometry: Geometry = False,
+    lens: LensPage = False,
     details: Details = False,
     formats: options.Formats = None,
 ) -> None:
     """Show which effects a run simulates, which not and why, and what it costs.
 
     The irradiance on the pixels is computed, since the contribution of an effect depends on the
-    scene. No frame is exposed, except with --measure, and nothing is written, except with --scenes.
+    scene. No frame is exposed, except with --measure, and nothing is written, except with --scenes
+    and with --lens.
 
     \b
     Example:
@@ -78,10 +87,18 @@ def plan(
       vcam plan camera.yaml --accuracy 0.001 --json
       vcam plan starter --details
       vcam plan starter --geometry
+      vcam plan double-gauss --lens
       vcam plan starter --scenes all
       vcam plan starter --scenes still-life --scenes my-scene.yaml
       vcam plan everything --scenes all --measure --turns 3
     """
+    if lens:
+        if scenes or geometry or as_json:
+            raise typer.BadParameter("--lens is by itself; leave out --scenes, --geometry, --json")
+        from vcam_cli.commands.plan_lens import plan_lens
+
+        plan_lens(camera, out, options.overrides(set_, accuracy=accuracy), quiet, formats)
+        return
     if scenes and geometry:
         raise typer.BadParameter("--geometry is of one scene; leave out --scenes")
     if (measure and not scenes) or (turns and not measure):

@@ -17,6 +17,7 @@ from vcam_cli.config.schema import (
     with_parts,
 )
 from vcam_cli.datasets.model import Dataset
+from vcam_cli.lenses.table import LensTable
 from vcam_cli.sweeps.model import KINDS, Case, Sweep
 from vcam_cli.verification.model import Measurement
 
@@ -30,6 +31,7 @@ def schemas() -> dict[str, Schema]:
     return {
         "camera.schema.json": camera,
         "study.schema.json": _study_schema(),
+        "lens.schema.json": file_schema(model_schema(LensTable), "a lens: a table of surfaces"),
         "measurement.schema.json": file_schema(model_schema(Measurement), "a measurement file"),
         "technology.schema.json": file_schema(model_schema(Technology), "a technology file"),
         **{

@@ -1,4 +1,4 @@
-"""`vcam validate`: checks camera, study and measurement files, runs nothing."""
+"""`vcam validate`: checks camera, study, measurement and lens files, runs nothing."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -8,7 +8,7 @@ import typer
 from vcam_cli.commands import options
 from vcam_cli.errors import one_line
 
-MEASUREMENT = "measurement"
+MEASUREMENT, LENS = "measurement", "lens"
 
 
 def validate(
@@ -25,7 +25,7 @@ def validate(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Check camera, study and measurement files and report everything that is wrong with them.
+    """Check camera, study, measurement and lens files: report everything that is wrong.
 
     \b
     Example:
@@ -70,7 +70,7 @@ def _check(file: str, sets: list[str]) -> dict[str, Any]:
 
 
 def _checked_name(file: str, sets: list[str]) -> str:
-    """Return the name of a camera or study without mistakes. Raise BadInput, CannotDo."""
+    """Return the name of a file's model without mistakes. Raise BadInput, CannotDo."""
     from vcam_cli.simulation.checks import load
 
     kind = _study_kind(file)
@@ -84,6 +84,11 @@ def _checked_name(file: str, sets: list[str]) -> str:
         from vcam_cli.verification import measurement_file
 
         return measurement_file.read(file).name
+    if kind == LENS:
+        from vcam_cli.lenses import files
+
+        found = Path(file)
+        return (files.read(found) if found.is_file() else files.shipped_lens(file)).name
     if kind == "dataset":
         from vcam_cli.datasets import dataset_file
 
@@ -105,8 +110,11 @@ def _study_kind(file: str) -> str | None:
     from vcam_cli.sweeps.model import KINDS
 
     path = Path(file)
+    if path.suffix.lower() == ".zmx":
+        return LENS
     if not is_file(path):
-        others = [k for k in ("studies", "measurements") if file in shipped.names(k)]
+        kinds = "studies", "measurements", "lenses"
+        others = [k for k in kinds if file in shipped.names(k)]
         if not others or file in shipped.names("cameras"):
             return None
         path = shipped.find(others[0], file)
@@ -116,6 +124,6 @@ def _study_kind(file: str) -> str | None:
         return None
     return (
         str(kind.value)
-        if kind is not None and kind.value in (*KINDS, "dataset", MEASUREMENT)
+        if kind is not None and kind.value in (*KINDS, "dataset", MEASUREMENT, LENS)
         else None
     )

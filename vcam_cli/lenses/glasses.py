@@ -1,7 +1,7 @@
 """Refractive indices: makers' dispersion formulas, and glasses of which only nd and Vd are known.
 
 All indices are relative to air, at about 20 C. The formulas come from the refractiveindex.info
-database (M. Polyanskiy, CC0 1.0), see `configs/lenses/glasses.csv`.
+database (M. Polyanskiy, CC0 1.0), see `data/glasses.csv`.
 """
 
 from __future__ import annotations
@@ -10,13 +10,14 @@ import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.config import shipped
 from vcam_cli.errors import nearest
 
+TABLE = Path(__file__).parents[1] / "data" / "glasses.csv"
 LINE_G, LINE_F, LINE_D, LINE_C = 435.8343e-9, 486.1327e-9, 587.5618e-9, 656.2725e-9
 """Spectral lines of mercury, hydrogen and helium in air [m]."""
 NORMAL_LINE = 0.6438, -0.001682
@@ -113,7 +114,7 @@ class ModelGlass(Glass):
 def catalog() -> Mapping[str, tuple[CatalogGlass, ...]]:
     """Return name -> the glasses of that name, of one maker or of several."""
     found: dict[str, tuple[CatalogGlass, ...]] = {}
-    with open(shipped.folder() / "lenses" / "glasses.csv", encoding="utf-8", newline="") as file:
+    with open(TABLE, encoding="utf-8", newline="") as file:
         for row in csv.DictReader(line for line in file if not line.startswith("#")):
             glass = CatalogGlass(
                 row["name"],

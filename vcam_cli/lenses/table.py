@@ -204,6 +204,7 @@ def read(file: Path, given: Mapping[str, Glass]) -> Prescription:
     CannotDo
         Where it may not be read.
     """
+    file = file.absolute()
     return prescription(document.read(file, file.parent, FORMAT).validate(), given)
 
 

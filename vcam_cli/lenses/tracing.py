@@ -95,6 +95,30 @@ def trace(
         return _trace(surfaces, indices, rays, stop, to_stop)
 
 
+def points(surfaces: Sequence[Surface], indices: Array, rays: Rays) -> tuple[Array, Array]:
+    """Return where rays meet the surfaces and the image plane: x and z (S + 1, ...) [m].
+
+    z counts from the first vertex; NaN from where a ray fails.
+    """
+    found, origin = [], 0.0
+    with np.errstate(all="ignore"):
+        for i, surface in enumerate(surfaces):
+            at = _meet(surface, rays, indices[i])
+            found.append((at.x, at.z + origin, at.alive))
+            origin += surface.thickness
+            rays = _refract(surface, at, indices[i], indices[i + 1]).shifted(surface.thickness)
+            rays = rays.after(-rays.z / rays.n, indices[i + 1])
+    found.append((rays.x, rays.z + origin, rays.alive))
+    x, z, alive = (np.array(part) for part in zip(*found, strict=True))
+    return np.where(alive, x, np.nan), np.where(alive, z, np.nan)
+
+
+def sag(surface: Surface, height: Array) -> Array:
+    """Return z of a surface at heights [m]; NaN where it does not exist."""
+    z, _, exists = _sag(surface, np.asarray(height, float) ** 2)
+    return np.where(exists, z, np.nan)
+
+
 def _trace(
     surfaces: Sequence[Surface], indices: Array, rays: Rays, stop: int, to_stop: bool
 ) -> Trace:

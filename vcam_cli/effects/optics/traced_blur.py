@@ -283,13 +283,16 @@ class TracedBlur(AberrationBlur, FieldTransfer):
         """Return the blur at so many places, traced once for each count."""
         if count not in self._kept:
             at = (1 - np.cos(np.pi * np.arange(count) / (count - 1))) / 2
-            heights = tuple((self.half_diagonal * at).tolist())
-            found = wavefronts(self.view, heights, self.shortest, self.longest)
-            self._kept[count] = tuple(
-                PlaceBlur(found.at(i), self.diffracts, self.longest, self.shortest)
-                for i in range(count)
-            )
+            self._kept[count] = self.at_heights(self.half_diagonal * at)
         return self._kept[count]
+
+    def at_heights(self, heights: Array) -> tuple[PlaceBlur, ...]:
+        """Return the blur at distances from the axis (F,) [m]. Raises BadInput without an image."""
+        found = wavefronts(self.view, tuple(heights.tolist()), self.shortest, self.longest)
+        return tuple(
+            PlaceBlur(found.at(i), self.diffracts, self.longest, self.shortest)
+            for i in range(len(heights))
+        )
 
     @cached_property
     def _kept(self) -> dict[int, tuple[PlaceBlur, ...]]:

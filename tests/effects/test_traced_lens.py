@@ -1,0 +1,136 @@
+"""A camera whose lens is given by its prescription: what follows from it, and what acts."""
+
+import math
+
+import numpy as np
+import pytest
+
+from vcam_cli import load
+from vcam_cli.camera.derived.geometry import geometry
+from vcam_cli.camera.derived.prescription import sensor_view, traced_lens
+from vcam_cli.effects.optics.aberration import Aberration
+from vcam_cli.effects.optics.diffraction import Diffraction
+from vcam_cli.effects.optics.off_axis import OffAxis
+from vcam_cli.effects.optics.traced_blur import TracedBlur
+from vcam_cli.errors import BadInput
+from vcam_cli.lenses.fields import View
+from vcam_cli.lenses.files import shipped_lens
+from vcam_cli.lenses.wavefronts import trace_field
+
+PHONE = "phone-double-gauss"
+
+
+def camera(*sets):
+    return load(PHONE, sets)
+
+
+def blur_of(model):
+    return TracedBlur.from_camera(model, geometry(model))
+
+
+def test_first_order_numbers_are_the_lens():
+    solved = geometry(camera())
+    lens = shipped_lens("double-gauss").scaled(0.091)
+    first = View(lens).paraxial
+    assert solved.focal_length == pytest.approx(first.focal_length, rel=1e-12)
+    assert solved.f_number == pytest.approx(4.5, rel=1e-9)
+    assert solved.pupil_magnification == pytest.approx(1.0, rel=1e-9)  # it is symmetric
+    stopped = geometry(camera("optics.prescription.f_number=8"))
+    assert stopped.f_number == pytest.approx(8, rel=1e-12)
+    # E / L is the pupil's area in direction cosines: about pi / (4 N^2) at infinity
+    far = geometry(camera("scene.distance=infinity"))
+    assert far.irradiance_per_radiance == pytest.approx(math.pi / 4 / 4.5**2, rel=0.01)
+
+
+def test_the_axis_is_sharpest_at_the_focus_distance():
+    def deformation(*sets):
+        places = blur_of(camera("array.rows=90", "array.columns=120", *sets)).at_heights(
+            np.zeros(1)
+        )
+        wavelength = shipped_lens("double-gauss").primary
+        return places[0].wavefront.deformation(wavelength)
+
+    sharp = deformation("optics.focus_distance=1 m")
+    assert deformation("optics.defocus=8 um") > sharp
+    assert deformation("optics.defocus=-8 um") > sharp
+    assert deformation("optics.focus_distance=0.4 m") > sharp
+
+
+def test_the_files_image_plane_is_where_the_file_has_it():
+    model = camera(
+        "scene.distance=infinity", "optics.prescription={use: double-gauss, image_plane: file}"
+    )
+    view = sensor_view(traced_lens(model), math.inf, 0.0)
+    assert view.lens.surfaces[-1].thickness == pytest.approx(42.35170011441e-3, rel=1e-12)
+    near = traced_lens(camera("optics.prescription={use: double-gauss, image_plane: file}"))
+    first = near.paraxial
+    moved = near.view(1.0).lens.surfaces[-1].thickness - 42.35170011441e-3
+    # Newton: x x' = f^2
+    assert moved == pytest.approx(first.focal_length**2 / (1 - first.focal_length), rel=1e-9)
+
+
+def test_its_own_transfer_replaces_diffraction():
+    model = camera()
+    assert Diffraction.from_camera(model, geometry(model)) is None
+    off = camera("effects={aberration: off}")
+    assert Diffraction.from_camera(off, geometry(off)) is not None
+    assert isinstance(Aberration.from_camera(model, geometry(model)), TracedBlur)
+
+
+def test_transfer_is_a_traced_wavefronts_and_turns_with_the_azimuth():
+    blur = blur_of(camera())
+    place = blur.at_heights(np.array([blur.half_diagonal]))[0]
+    f, wave = np.linspace(20e3, 180e3, 5), 520e-9
+    direct = trace_field(blur.view, np.array([blur.half_diagonal]), wave, wave).at(0)
+    half = direct.half_frame(wave)
+    grid = direct.grid(wave, direct.mask(192))
+    expected = grid.interpolate(wave * f / half[0], 0 * f)
+    # 5 traced wavelengths are enough for any between, at one frequency
+    assert np.abs(place.otf_along(f, (1.0, 0.0), wave) - expected).max() < 2e-3
+    parts = place.harmonics(np.linspace(0, 180e3, 10), np.array([wave]))[0]
+    orders = np.arange(parts.shape[1])
+    angle = 0.7
+    terms = parts * np.exp(1j * orders * angle)
+    whole = np.where(orders % 2, 1j * terms.imag, terms.real).sum(axis=1)
+    way = math.cos(angle), math.sin(angle)
+    straight = place.otf_along(np.linspace(0, 180e3, 10), way, wave)
+    assert np.abs(whole - straight).max() < 1e-3
+
+
+def test_rays_alone_blur_less_than_waves_at_low_frequencies():
+    rays = blur_of(camera("optics.diffraction=false"))
+    waves = blur_of(camera())
+    f = np.array([30e3])
+    for height in (0.0, 1.2e-3):
+        one = abs(rays.at_heights(np.array([height]))[0].otf_along(f, (1.0, 0.0), 550e-9))
+        other = abs(waves.at_heights(np.array([height]))[0].otf_along(f, (1.0, 0.0), 550e-9))
+        assert other < one <= 1
+
+
+def test_falloff_is_the_pupils_area():
+    model = camera()
+    effect = OffAxis.from_camera(model, geometry(model))
+    assert effect.describe().startswith("traced: corners")
+    plain = camera("optics.off_axis=none")
+    assert OffAxis.from_camera(plain, geometry(plain)) is None
+
+
+WRONG = {
+    "optics.prescription=dubble-gauss": "did you mean 'double-gauss'?",
+    "optics.f_number=2.8": "cannot be given beside prescription",
+    "optics.zernike={4: 0.1 um}": "cannot be given beside prescription",
+    "optics.prescription={use: sonnar, scale: 0.02}": "forms no image at the corner",
+    "optics.prescription={use: sonnar}": "stop down",
+    "optics.prescription={scale: 2}": "the lens is missing",
+    "optics.prescription={file: nothing.zmx}": "nothing.zmx",
+}
+
+
+@pytest.mark.parametrize(("change", "said"), WRONG.items(), ids=WRONG)
+def test_mistakes_are_said_with_a_remedy(change, said):
+    from vcam_cli.simulation.checks import load as checked
+
+    with pytest.raises(BadInput) as error:
+        checked(PHONE, [change])
+    assert said in str(error.value)
+    assert "optics" in str(error.value)
