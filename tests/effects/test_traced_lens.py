@@ -10,6 +10,8 @@ from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.derived.prescription import sensor_view, traced_lens
 from vcam_cli.effects.optics.aberration import Aberration
 from vcam_cli.effects.optics.diffraction import Diffraction
+from vcam_cli.effects.optics.distortion import Distortion
+from vcam_cli.effects.optics.lateral_color import LateralColor
 from vcam_cli.effects.optics.off_axis import OffAxis
 from vcam_cli.effects.optics.traced_blur import TracedBlur
 from vcam_cli.errors import BadInput
@@ -18,6 +20,7 @@ from vcam_cli.lenses.files import shipped_lens
 from vcam_cli.lenses.wavefronts import trace_field
 
 PHONE = "phone-double-gauss"
+FULL_SIZE = "optics.prescription={use: double-gauss, scale: 1, image_plane: file}"
 
 
 def camera(*sets):
@@ -58,11 +61,14 @@ def test_the_axis_is_sharpest_at_the_focus_distance():
 
 def test_the_files_image_plane_is_where_the_file_has_it():
     model = camera(
-        "scene.distance=infinity", "optics.prescription={use: double-gauss, image_plane: file}"
+        "scene.distance=infinity",
+        "optics.prescription={use: double-gauss, scale: 1, image_plane: file}",
     )
     view = sensor_view(traced_lens(model), math.inf, 0.0)
     assert view.lens.surfaces[-1].thickness == pytest.approx(42.35170011441e-3, rel=1e-12)
-    near = traced_lens(camera("optics.prescription={use: double-gauss, image_plane: file}"))
+    near = traced_lens(
+        camera("optics.prescription={use: double-gauss, scale: 1, image_plane: file}")
+    )
     first = near.paraxial
     moved = near.view(1.0).lens.surfaces[-1].thickness - 42.35170011441e-3
     # Newton: x x' = f^2
@@ -85,6 +91,7 @@ def test_transfer_is_a_traced_wavefronts_and_turns_with_the_azimuth():
     half = direct.half_frame(wave)
     grid = direct.grid(wave, direct.mask(192))
     expected = grid.interpolate(wave * f / half[0], 0 * f)
+    expected *= np.exp(-2j * np.pi * f * place._shift(wave))  # of lateral color that is left
     # 5 traced wavelengths are enough for any between, at one frequency
     assert np.abs(place.otf_along(f, (1.0, 0.0), wave) - expected).max() < 2e-3
     parts = place.harmonics(np.linspace(0, 180e3, 10), np.array([wave]))[0]
@@ -97,14 +104,33 @@ def test_transfer_is_a_traced_wavefronts_and_turns_with_the_azimuth():
     assert np.abs(whole - straight).max() < 1e-3
 
 
-def test_rays_alone_blur_less_than_waves_at_low_frequencies():
-    rays = blur_of(camera("optics.diffraction=false"))
-    waves = blur_of(camera())
-    f = np.array([30e3])
+def test_rays_are_what_is_left_of_waves_in_strong_blur():
+    # 400 um out of focus the blur has 90 um, of which diffraction is a small part
+    sets = ("optics.defocus=400 um",)
+    rays, waves = blur_of(camera("optics.diffraction=false", *sets)), blur_of(camera(*sets))
+    f = np.linspace(0, 20e3, 7)
     for height in (0.0, 1.2e-3):
-        one = abs(rays.at_heights(np.array([height]))[0].otf_along(f, (1.0, 0.0), 550e-9))
-        other = abs(waves.at_heights(np.array([height]))[0].otf_along(f, (1.0, 0.0), 550e-9))
-        assert other < one <= 1
+        one = rays.at_heights(np.array([height]))[0].otf_along(f, (1.0, 0.0), 550e-9)
+        other = waves.at_heights(np.array([height]))[0].otf_along(f, (1.0, 0.0), 550e-9)
+        assert np.abs(one - other).max() < 0.05
+
+
+def test_distortion_and_color_are_those_of_the_chief_rays():
+    model = camera()
+    solved = geometry(model)
+    blur = blur_of(model)
+    heights = np.array([0.4e-3, 1.0e-3, 1.4e-3])
+    angles = blur.view.angle_of(heights)
+    places = Distortion.from_camera(model, solved).places(heights, 0 * heights, 550e-9, 0.0)[0]
+    ideal = blur.view.image_scale * np.tan(angles)
+    # straight between 129 heights
+    assert places == pytest.approx(ideal, abs=0.002e-6)
+    color = LateralColor.from_camera(model, solved)
+    for wave in (450e-9, 640e-9):
+        landed = blur.view.heights(angles, np.array([wave]))[:, 0]
+        kept = heights * color.factor(wave)
+        moved = [place._shift(wave) for place in blur.at_heights(heights)]
+        assert kept + np.array(moved) == pytest.approx(landed, abs=1e-9)
 
 
 def test_falloff_is_the_pupils_area():
@@ -120,8 +146,8 @@ WRONG = {
     "optics.f_number=2.8": "cannot be given beside prescription",
     "optics.zernike={4: 0.1 um}": "cannot be given beside prescription",
     "optics.prescription={use: sonnar, scale: 0.02}": "forms no image at the corner",
-    "optics.prescription={use: sonnar}": "stop down",
-    "optics.prescription={scale: 2}": "the lens is missing",
+    "optics.prescription={use: sonnar, scale: 10}": "stop down",
+    "optics.distortion={k1: 0.1}": "cannot be given beside prescription",
     "optics.prescription={file: nothing.zmx}": "nothing.zmx",
 }
 

@@ -287,9 +287,9 @@ def _traced_alone(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
             message = "cannot be given beside prescription, from which it follows"
             remedy = f"remove {name}; prescription: {{use: NAME, scale: 0.1, f_number: 4}} sets it"
             yield fault((name,), message, remedy, given[name])
-    for name in ("zernike", "psf", "mtf"):
+    for name in ("zernike", "psf", "mtf", "distortion", "lateral_color", "focus_shift"):
         if given.get(name) not in (None, "none") and not _neutral(name, given[name]):
-            message = "cannot be given beside prescription, which has all aberrations in it"
+            message = "cannot be given beside prescription, from which it follows"
             yield fault((name,), message, f"remove {name}", given[name])
 
 

@@ -58,6 +58,8 @@ class FieldWavefronts:
     """Landing point furthest from the chief ray's (F,) [m]."""
     typical: Array
     """Distance within which 90 % of the rays land (F, W) [m]."""
+    shifts: Array
+    """Chief ray's landing point behind the image point, outwards (F, W) [m]."""
     residual: Array
     """What the polynomials leave of the paths, rms (F,) [m]."""
     lost: Array
@@ -240,6 +242,7 @@ def trace_field(
         edges,
         MARGIN * lands.max(axis=(1, 2)),
         np.quantile(lands[:, :-1], 0.9, axis=2),
+        (view.heights(angles, wavelengths) - heights[:, None]),
         left,
         1 - alive.mean(axis=(1, 2)),
     )

@@ -8,6 +8,8 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry, geometry
+from vcam_cli.camera.derived.prescription import distortion as traced_distortion
+from vcam_cli.camera.derived.prescription import sensor_view, traced_lens
 from vcam_cli.camera.lens_distortion import DistortionFile, FisheyeDistortion, OpenCvDistortion
 from vcam_cli.camera.model import CameraModel
 from vcam_cli.errors import bad, data_file_problems
@@ -54,6 +56,12 @@ def lens_mapping(camera: CameraModel, geometry: Geometry) -> Mapping | None:
             heights, distortions = _table(file)
             scaled = tuple((heights / geometry.image_distance).tolist())
             found.append(DistortionTable(scaled, tuple(distortions.tolist())))
+    if traced := traced_lens(camera):
+        view = sensor_view(traced, geometry.object_distance, optics.defocus)
+        corner = math.hypot(geometry.sensor_width, geometry.sensor_height) / 2
+        table = traced_distortion(view, corner)
+        scaled = tuple(height / geometry.image_distance for height in table.heights)
+        found.append(DistortionTable(scaled, table.values))
     if not found:
         return None
     return found[0] if len(found) == 1 else Chain(tuple(found))
@@ -70,6 +78,7 @@ def check(camera: CameraModel) -> None:
         return
     if camera.scene.has_distances:
         key = "projection" if optics.distortion is None else "distortion"
+        key = "prescription" if optics.prescription else key
         raise bad(
             ("optics", key),
             "scenes with depth or layers are not simulated through a lens that distorts",

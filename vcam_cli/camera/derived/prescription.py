@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vcam_cli.arrays import Array
+from vcam_cli.camera.color_errors import WavelengthTable
 from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.optics import Prescription as Given
 from vcam_cli.config import shipped
@@ -29,6 +29,8 @@ FALLOFF_HEIGHTS = 25
 """Image heights whose pupils are traced; between them cubics without overshoot are good to 1e-4."""
 TABLE_HEIGHTS = 129
 """Heights of the tables that are handed on, straight in between."""
+COLOR_HEIGHTS, COLOR_WAVELENGTHS = 12, 13
+"""Image heights and wavelengths from which the magnification by wavelength follows."""
 FOCUS_RAYS = 24
 
 
@@ -221,13 +223,32 @@ def axial_area(view: View) -> float:
 
 
 @lru_cache(maxsize=32)
-def color_table(view: View, corner: float, wavelengths: tuple[float, ...]) -> Array:
-    """Return where chief rays land over where an ideal lens images (F, W), at `TABLE_HEIGHTS`.
+def distortion(view: View, corner: float) -> FieldTable:
+    """Return real over ideal image height, less 1, up to the corner [m]. Raises BadInput.
 
-    The object points are those that the primary wavelength images evenly from the center to the
-    corner [m]; the first row is the limit at the center.
+    Ideal is the scale near the center: what a camera calibrator sees.
     """
-    heights = np.linspace(0, corner, FALLOFF_HEIGHTS)
+    heights = np.linspace(0, corner, TABLE_HEIGHTS)
     angles = view.angle_of(heights[1:])
-    found = view.heights(angles, np.array(wavelengths))
-    return np.asarray(found / (view.image_scale * np.tan(angles))[:, None])
+    if np.isnan(angles).any():
+        raise no_image(view, corner, "rays through the center of its stop fail")
+    ideal = view.image_scale * np.tan(angles)
+    values = np.append(0.0, heights[1:] / ideal - 1)
+    return FieldTable(tuple(heights.tolist()), tuple(values.tolist()))
+
+
+@lru_cache(maxsize=32)
+def lateral_color(view: View, corner: float, shortest: float, longest: float) -> WavelengthTable:
+    """Return the magnification by wavelength, over that of the primary one, less 1.
+
+    The best one over the disk up to the corner [m]: what is left changes with the field, and moves
+    the blurs.
+    """
+    heights = corner * np.sqrt((np.arange(COLOR_HEIGHTS) + 0.5) / COLOR_HEIGHTS)
+    waves = np.linspace(shortest, longest, COLOR_WAVELENGTHS)
+    found = view.heights(view.angle_of(heights), waves)
+    if np.isnan(found).any():
+        raise no_image(view, corner, "rays of some wavelengths fail")
+    change = (heights @ (found - heights[:, None])) / (heights @ heights)
+    nanometers = (waves * 1e9).tolist()
+    return WavelengthTable(tuple(zip(nanometers, change.tolist(), strict=True)))

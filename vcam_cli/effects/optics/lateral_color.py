@@ -16,6 +16,8 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.color_errors import WavelengthTable
 from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.camera.derived.prescription import lateral_color as traced_lateral_color
+from vcam_cli.camera.derived.prescription import sensor_view, traced_lens
 from vcam_cli.effects.base import Magnification
 
 
@@ -37,9 +39,13 @@ class LateralColor(Magnification):
     def from_camera(cls, camera: Camera, geometry: Geometry) -> LateralColor | None:
         """Return the lateral color of a camera's lens, or None where it has none."""
         table = camera.optics.lateral_color
+        corner = float(np.hypot(geometry.sensor_width, geometry.sensor_height)) / 2
+        if traced := traced_lens(camera):
+            view = sensor_view(traced, geometry.object_distance, camera.optics.defocus)
+            band = camera.scene.wavelengths
+            table = traced_lateral_color(view, corner, band.start, band.stop)
         if not camera.optics.is_lens or table is None or not any(v for _, v in table.points):
             return None
-        corner = float(np.hypot(geometry.sensor_width, geometry.sensor_height)) / 2
         return cls(table, corner, max(geometry.pitch_x, geometry.pitch_y))
 
     def describe(self) -> str:

@@ -15,9 +15,21 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.color_errors import WavelengthTable
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.camera.derived.prescription import sensor_view, traced_lens, wavefronts
-from vcam_cli.effects.base import FieldTransfer, PlaneTransfer, Zone, switched_off
+from vcam_cli.camera.derived.prescription import (
+    lateral_color,
+    sensor_view,
+    traced_lens,
+    wavefronts,
+)
+from vcam_cli.effects.base import (
+    FieldTransfer,
+    PlaneTransfer,
+    SignalLevels,
+    Zone,
+    switched_off,
+)
 from vcam_cli.effects.optics.field_blur import ZoneWeight
 from vcam_cli.effects.optics.wavefront_blur import GREEN, AberrationBlur, largest_loss
 from vcam_cli.lenses.fields import View
@@ -34,6 +46,9 @@ PLACES_PER_WAVE = 3.0
 MOST_CYCLES = 16.0
 """Frequency times the blur's radius from which nothing is taken to be left: of an evenly filled
 disk it is a thousandth."""
+FEWEST_NODES, NODES_PER_CYCLE, MOST_BLUR_CYCLES = 5, 3.0, 4.0
+"""Wavelengths at which transfers are computed, and further ones for each cycle by which the blur's
+radius changes over the band at the highest frequency; of more cycles little contrast is left."""
 RAYS = 48
 """Rays across a pupil where they are traced without diffraction."""
 
@@ -47,6 +62,8 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
     longest: float
     shortest: float
     """Range of wavelengths that it is asked for [m]."""
+    color: WavelengthTable
+    """Magnification by wavelength, which `lateral_color` simulates."""
     angle: float = 0.0
     kept: dict[float, OtfGrid] = field(default_factory=dict)
     """Grids by wavelength, shared by all angles."""
@@ -74,7 +91,8 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
     def reach(self) -> float:
         """How far from its place it throws almost all of the light [m]."""
         airy = 2 * GREEN / self._width if self.diffracts else 0.0
-        return self.typical + airy
+        moved = max(abs(self._shift(w)) for w in (self.shortest, self.longest))
+        return self.typical + airy + moved
 
     @property
     def _width(self) -> float:
@@ -82,21 +100,22 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
 
     def spread(self, wavelengths: Array) -> Array:
         """Return a bound (J,) on |1 - H(f)| / (2 pi |f|) at wavelengths (J,) [m]."""
-        farthest = float(self.wavefront.field.farthest[self.wavefront.place])
+        known, place = self.wavefront.field, self.wavefront.place
+        moved = np.array([abs(self._shift(w)) for w in wavelengths.tolist()])
         if not self.diffracts:
-            return np.full(len(wavelengths), farthest)
-        return np.array([self.wavefront.spread(w) for w in wavelengths.tolist()])
+            return moved + float(known.farthest[place])
+        return moved + np.array([self.wavefront.spread(w) for w in wavelengths.tolist()])
 
     def cutoff(self, wavelength: float) -> float:
         """Return the frequency from which the transfer is zero, or counts as zero [cycles/m]."""
-        known = self.wavefront.field
-        node = int(np.abs(1 / known.wavenumbers - wavelength).argmin())
-        rays = self._blurred_out(node)
+        rays = self._blurred_out(wavelength)
         return min(self.wavefront.cutoff(wavelength), rays) if self.diffracts else rays
 
-    def _blurred_out(self, node: int) -> float:
-        """Return the frequency from which rays of a traced wavelength leave nothing [cycles/m]."""
-        radius = float(self.wavefront.field.typical[self.wavefront.place, node])
+    def _blurred_out(self, wavelength: float) -> float:
+        """Return the frequency from which rays of a wavelength leave nothing [cycles/m]."""
+        known = self.wavefront.field
+        widths = known.typical[self.wavefront.place]
+        radius = float(np.interp(1 / wavelength, known.wavenumbers, widths))
         return MOST_CYCLES / max(radius, 1e-8)
 
     def otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
@@ -121,7 +140,7 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
             part[frequency >= self.cutoff(wavelength)] = 0
         return np.asarray(between)
 
-    def mean_error(self, signal) -> float:  # type: ignore[no-untyped-def]
+    def mean_error(self, signal: SignalLevels) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         return largest_loss(self, 0.999 * self.cutoff(GREEN)) * float(signal.full_signal)
 
@@ -142,16 +161,31 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
 
     @cached_property
     def _nodes(self) -> Array:
-        """Wavenumbers at which it is computed."""
-        return self.wavefront.field.wavenumbers
+        """Wavenumbers at which it is computed: the more, the more the blur changes by color."""
+        known = self.wavefront.field
+        if len(known.wavenumbers) == 1:
+            return known.wavenumbers
+        widths = known.typical[self.wavefront.place]
+        cycles = float(np.ptp(widths)) * self.wavefront.cutoff(self.longest)
+        count = FEWEST_NODES + math.ceil(NODES_PER_CYCLE * min(cycles, MOST_BLUR_CYCLES))
+        low, high = 1 / self.longest, 1 / self.shortest
+        angle = (np.arange(count) + 0.5) * (math.pi / count)
+        return (low + high) / 2 - (high - low) / 2 * np.cos(angle)
 
     def _at_node(self, fx: Array, fy: Array, node: int) -> Array:
         """Return the transfer at a traced wavelength; 0 where rays leave nothing."""
         wavelength = 1 / float(self._nodes[node])
-        inside = np.hypot(fx, fy) < self._blurred_out(node)
+        inside = np.hypot(fx, fy) < self._blurred_out(wavelength)
         fx, fy = np.where(inside, fx, 0.0), np.where(inside, fy, 0.0)
         found = (self._by_waves if self.diffracts else self._by_rays)(fx, fy, wavelength)
-        return np.where(inside, found, 0.0)
+        moved = np.exp(-2j * np.pi * fx * self._shift(wavelength))
+        return np.where(inside, found * moved, 0.0)
+
+    def _shift(self, wavelength: float) -> float:
+        """Return how far outwards a color lies beside what `lateral_color` moves it to [m]."""
+        known, place = self.wavefront.field, self.wavefront.place
+        found = float(lagrange(known.wavenumbers, 1 / wavelength) @ known.shifts[place])
+        return found - float(self.color.at(wavelength)) * float(known.heights[place])
 
     def _by_waves(self, fx: Array, fy: Array, wavelength: float) -> Array:
         half = self.wavefront.half_frame(wavelength)
@@ -250,6 +284,10 @@ class TracedBlur(AberrationBlur, FieldTransfer):
                 " followed"
             )
 
+    def mean_error(self, signal: SignalLevels) -> float:
+        """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
+        return max(place.mean_error(signal) for place in self._places(FEWEST_PLACES))
+
     def rings(self, count: int) -> tuple[Zone, ...]:
         """Return blurs at Chebyshev's points from center to corner, whose weights sum to 1."""
         places = self._places(self._enough(count))
@@ -289,8 +327,9 @@ class TracedBlur(AberrationBlur, FieldTransfer):
     def at_heights(self, heights: Array) -> tuple[PlaceBlur, ...]:
         """Return the blur at distances from the axis (F,) [m]. Raises BadInput without an image."""
         found = wavefronts(self.view, tuple(heights.tolist()), self.shortest, self.longest)
+        color = lateral_color(self.view, self.half_diagonal, self.shortest, self.longest)
         return tuple(
-            PlaceBlur(found.at(i), self.diffracts, self.longest, self.shortest)
+            PlaceBlur(found.at(i), self.diffracts, self.longest, self.shortest, color)
             for i in range(len(heights))
         )
 
