@@ -257,6 +257,9 @@ def accepted(entry):
     """Whether a camera of that shipped camera takes entries "path: value and path: value"."""
     for one in re.split(" and (?=[a-z]+[.:])", entry):
         path, _, value = one.partition(": ")
+        if path == "optics.prescription":  # of a camera whose lens is traced, and a file that ships
+            assert load("double-gauss", [f"{path}={{use: cooke-triplet}}"]).optics.prescription
+            continue
         ccd = ["pixel.architecture=ccd"] if "charge_transfer" in path else []
         load_with(*ccd, f"{path}={value}")
     return True
@@ -367,6 +370,7 @@ NEEDS_MORE = {
     "pixel.photodetector.dark_current.doubling",
     "pixel.readout.charge_transfer",  # of a ccd
     "adc.reference",  # of a logarithmic ADC
+    *("optics.prescription.glasses.nd", "optics.prescription.glasses.vd"),  # of a glass by its name
     *(f"array.filters.{name}" for name in ("column", "unit", "table", "outside", "silicon", "per")),
 }
 """Keys whose examples are right beside another key that the plain camera does not have."""

@@ -162,7 +162,7 @@ class LensTable(FileModel):
         "half the field angle that it is designed for", example="14 deg", default=None
     )
     surfaces: Annotated[tuple[SurfaceRow, ...], Either(_rows, list[SurfaceRow])] = key(
-        "from the object to the image", example=[{"radius": 40.94, "thickness": 8.74}]
+        "from the object to the image", example=[{"radius": 40.94, "thickness": 8.74, "stop": True}]
     )
 
     rules: ClassVar[tuple[Rule, ...]] = (

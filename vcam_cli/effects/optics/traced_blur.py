@@ -104,7 +104,8 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
         moved = np.array([abs(self._shift(w)) for w in wavelengths.tolist()])
         if not self.diffracts:
             return moved + float(known.farthest[place])
-        return moved + np.array([self.wavefront.spread(w) for w in wavelengths.tolist()])
+        spreads = [self.wavefront.spread(w) for w in wavelengths.tolist()]
+        return np.asarray(moved + np.array(spreads))
 
     def cutoff(self, wavelength: float) -> float:
         """Return the frequency from which the transfer is zero, or counts as zero [cycles/m]."""
@@ -170,7 +171,7 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
         count = FEWEST_NODES + math.ceil(NODES_PER_CYCLE * min(cycles, MOST_BLUR_CYCLES))
         low, high = 1 / self.longest, 1 / self.shortest
         angle = (np.arange(count) + 0.5) * (math.pi / count)
-        return (low + high) / 2 - (high - low) / 2 * np.cos(angle)
+        return np.asarray((low + high) / 2 - (high - low) / 2 * np.cos(angle))
 
     def _at_node(self, fx: Array, fy: Array, node: int) -> Array:
         """Return the transfer at a traced wavelength; 0 where rays leave nothing."""

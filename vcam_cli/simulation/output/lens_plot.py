@@ -34,7 +34,8 @@ def plot_lens(path: Path | str, page: LensPage) -> None:
 
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=SIZE, dpi=110, layout="constrained")
-        top, middle, bottom = figure.subfigures(3, 1, height_ratios=(1.25, 0.85, 1.0))
+        parts: Any = figure.subfigures(3, 1, height_ratios=(1.25, 0.85, 1.0))
+        top, middle, bottom = parts
         top.suptitle(page.title, x=0.01, ha="left", fontsize=12)
         section, facts = top.subplots(1, 2, width_ratios=(2.6, 1))
         _draw_section(section, page)
