@@ -17,6 +17,8 @@ WORDS = (
 )
 MENTIONS = {
     "stray_light": r"stray_light|StrayLight",
+    "lateral_color": r"lateral_color|LateralColor",
+    "small": r"SmallPhotodiode|readout\.small|given\.small|\.small\b|\"small\"",
     "step-wedge": r"step[-_]wedge|StepWedge",
     "npz": r"npz",
     "schema": r"vcam schema\b|commands\.schema\b|\bschema:schema\b|commands\.main import app",
@@ -65,6 +67,14 @@ def test_there_is_a_recipe_for_every_kind_of_addition():
 
 ANY_CHARTS = {"vcam_cli/simulation/scene_plans.py"}
 """Sources that name some charts, which any others could stand for."""
+OTHERS = {
+    "lateral_color": {  # of a traced lens, which has one of its own; and an equation that names it
+        "vcam_cli/camera/derived/prescription.py", "vcam_cli/effects/optics/traced_blur.py",
+        "vcam_cli/simulation/lens_page.py", "vcam_cli/image_formation/warps.py",
+    },
+    "small": {"vcam_cli/config/quantities.py"},  # the word: too small
+}  # fmt: skip
+"""Sources that mean something else by the example's name."""
 FRAMES = re.compile(
     r"vcam_cli/(datasets/|files/(frame_archive|points_store)\.py"
     r"|verification/(frame_files|measurement_file)\.py)"
@@ -84,7 +94,7 @@ class TestRecipe:
 
     def test_no_other_source_mentions_the_example(self, recipe):
         listed = {name for name in recipe.files if name.startswith("vcam_cli/")}
-        found = mentioning(recipe.example, ROOT) - ANY_CHARTS
+        found = mentioning(recipe.example, ROOT) - ANY_CHARTS - OTHERS.get(recipe.example, set())
         assert {name for name in found if not FRAMES.match(name)} == listed
 
 
