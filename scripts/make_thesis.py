@@ -1,9 +1,9 @@
 """Writes docs/thesis.md: every figure, table and equation of the thesis, and vcam's answer.
 
 It runs the studies whose tables it needs, each into its own folder out/STUDY, and the checks;
-keeps their numbers in docs/thesis_runs.json (`thesis_runs`); and makes the page of the kept numbers
-alone. With the word `page` it makes the page anew and runs nothing. Sweeps keep their finished
-points: run again, they take seconds while the code is the same.
+keeps their numbers in docs/thesis_runs.json (`thesis_runs`); draws the figures (`thesis_figures`);
+and makes the page of the kept numbers alone. With the word `page` it makes the page anew and runs
+nothing. Sweeps keep their finished points: run again, they take seconds while the code is the same.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import thesis_figures
 import thesis_pixels
 import thesis_runs
 import yaml
@@ -46,7 +47,8 @@ HEAD = """# The thesis, row by row
 <!-- Written by `make thesis` from docs/thesis_runs.json, to which a test holds it. -->
 
 Every figure, table and equation of T. Chen, *Digital Camera System Simulator and Applications*, PhD
-thesis, Stanford University, 2003, with the command or test that answers it.
+thesis, Stanford University, 2003, with the command or test that answers it. Apart are [its figures
+over its own axes](thesis-figures.md) and [its tables 2.1 to 2.4](thesis-structures.md).
 """
 
 
@@ -274,6 +276,7 @@ def main() -> None:
         for kind, study in thesis_runs.studies(given):
             thesis_runs.run(kind, study)
         thesis_runs.write(thesis_runs.collect(given))
+        thesis_figures.draw(thesis_runs.read())
     runs = thesis_runs.read()
     PAGE.write_text(page(runs), encoding="utf-8")
     found = [row.verdict(row.value(runs)) for row in rows()]

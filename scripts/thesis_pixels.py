@@ -103,14 +103,15 @@ def peak_efficiency() -> float:
 
 
 @cache
-def _mtf(width: float) -> tuple[np.ndarray, np.ndarray]:
+def mtf(width: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return frequency [lp/mm], to the Nyquist frequency of 6 um, and system MTF of a size."""
     nyquist = 1e3 / (2 * 6.0)  # of a 6 um pixel, to which figure 3.2 normalizes [lp/mm]
     (one, *_) = properties.curves(_camera(width), FREQUENCY, nyquist)
     return np.asarray(one.x[FREQUENCY]), np.asarray(one.y["system_mtf"])
 
 
 def _mtf_at_half(width: float) -> float:
-    x, y = _mtf(width)
+    x, y = mtf(width)
     return float(np.interp(0.5e3 / 12, x, y))
 
 
@@ -121,8 +122,18 @@ def mtf_12_over_6um() -> float:
 
 def center_vignetting_6um() -> float:
     """QE of the center pixel of figure 3.12 over that without vignetting, 6 um."""
-    (one, *_) = properties.curves(_camera(6, **LENS), POSITION, 0.0)
-    return float(np.max(one.y["qe_over_no_vignetting"]))
+    return float(np.max(along_diagonal(6)[1]))
+
+
+def along_diagonal(width: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return places [mm] on the diagonal and QE over that without vignetting, figure 3.12."""
+    (one, *_) = properties.curves(_camera(width, **LENS), POSITION, 0.0)
+    return np.asarray(one.x[POSITION]), np.asarray(one.y["qe_over_no_vignetting"])
+
+
+def at_30_ms(name: str, width: float) -> float:
+    """Return a property of a size at the exposure of figure 3.2."""
+    return float(properties.value(_camera(width, **{"exposure.time": "30 ms"}), name))
 
 
 @cache
