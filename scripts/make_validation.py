@@ -115,13 +115,17 @@ def emva_section(folder: Path, out: Path, picture: Path) -> Iterator[str]:
     yield ""
     yield "*differ*: by more than chance, within the tolerance (2 % of means, 10 % of noise);"
     yield "*missed*: by more than both.\n"
-    missed = [row for row in rows if row.verdict == "missed"]
+    far = [row for row in rows if row.verdict in ("differs", "missed")]
     cells = [
-        f"| {r.frame} | {r.quantity} | {r.measured:.4g} | {r.predicted:.4g} | {r.error:+.3g} % |"
-        for r in missed
+        f"| {r.frame} | {r.quantity} | {r.measured:.4g} | {r.predicted:.4g} | {r.error:+.3g} %"
+        f" | {r.verdict} |"
+        for r in far
     ]
-    head = ["| frame | quantity | measured | predicted | error |", "|---|---|---|---|---|"]
-    yield from _folded(f"All {len(missed)} predictions that miss", [*head, *cells])
+    head = [
+        "| frame | quantity | measured | predicted | error | verdict |",
+        "|---|---|---|---|---|---|",
+    ]
+    yield from _folded(f"All {len(far)} predictions that differ or miss", [*head, *cells])
 
 
 def _left_out(folder: Path) -> list[str]:
