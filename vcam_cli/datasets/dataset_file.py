@@ -131,8 +131,8 @@ def _check_camera(model: Dataset, camera: Camera) -> None:
     if camera.array.is_scattered:
         message = "its pixels are not on a grid of rows and columns"
         raise BadInput([_problem(model, ("camera",), message, "take another pattern")])
-    if camera.exposure.count > 1:
-        message = "it takes several samples of one integration"
+    if camera.exposure.has_samples:
+        message = "it takes several samples of one integration, or a bracket"
         raise BadInput([_problem(model, ("camera",), message, "give exposure.time")])
     if "depth" in model.write and camera.scene.moves:
         message = "the scene moves, so that its depth is not one"

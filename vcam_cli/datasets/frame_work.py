@@ -80,6 +80,15 @@ def labels(result: Result) -> dict[str, float]:
         "dark_signal [e]": dark,
         "dark_variance [DN2]": gain**2 * temporal + ROUNDING,
         **rms,
+        **{
+            f"{what}.{branch.name}{unit}": value
+            for branch in frame.chain.branches
+            for what, unit, value in (
+                ("system_gain", " [DN/e]", 1 / branch.circuit.electrons_per_dn),
+                ("offset", " [DN]", branch.circuit.offset),
+                ("sensitivity", "", branch.sensitivity),
+            )
+        },
         "gain_pixel": fpn.gain_pixel or 0.0,
         "gain_column": fpn.gain_column or 0.0,
         "mean [DN]": float(result.dn.mean(dtype=float)),

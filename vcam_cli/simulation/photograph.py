@@ -68,6 +68,11 @@ class Photograph:
         return self._displayed(self.frame.dn)
 
     @property
+    def readouts_dn(self) -> dict[str, Array]:
+        """Codes of every readout of an exposure by its name, as `dn`; {} where there is one."""
+        return {name: self._displayed(dn) for name, dn in self.frame.readouts_dn.items()}
+
+    @property
     def electrons(self) -> Array:
         """Raw signal before the ADC, noisy, clipped above at the full well [electrons]."""
         return self._displayed(self.frame.electrons)

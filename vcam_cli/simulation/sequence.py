@@ -69,11 +69,15 @@ def frame_cameras(camera: Camera, count: int, rate: float) -> Iterator[Camera]:
 def _require_room(camera: Camera, rate: float) -> None:
     auto, last = camera.exposure.auto, line_times(camera, geometry(camera)).line_time
     longest = auto.max if auto is not None else camera.exposure.longest
+    if camera.exposure.bracket:
+        longest = sum(camera.exposure.bracket)
     assert longest is not None
     if longest + last > (1 + 1e-9) / rate:
         key = "auto.max" if auto is not None else "time"
+        for several in ("captures", "bracket"):
+            key = several if getattr(camera.exposure, several) else key
         raise bad(
-            f"exposure.{key}" if camera.exposure.captures is None else "exposure.captures",
+            f"exposure.{key}",
             f"{render(longest, 'time')} do not fit {rate:g} frames a second",
             f"make it shorter than {render(float(f'{1 / rate - last:.3g}'), 'time')},"
             " or --fps lower",
