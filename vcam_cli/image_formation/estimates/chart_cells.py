@@ -210,7 +210,7 @@ class CellError:
         zero, found = np.zeros_like(f), []
         for axes in ((f, zero), (zero, f)):
             passed = self._passed(*axes)
-            turns = f * side
+            turns = np.minimum(f * side, 0.5)  # beyond, nothing is folded but all is lost
             parts = (np.square(_folded(turns, k) * side / (2 * np.pi * (turns + k))) for k in FOLDS)
             folded = sum(parts, zero)
             own = 1 / np.square(2 * np.pi * np.maximum(f, 1e-9 * self.top))
@@ -223,7 +223,7 @@ class CellError:
         f = (np.arange(FREQUENCIES) + 0.5) * (self.top / FREQUENCIES)
         fx, fy = np.meshgrid(f, f)
         passed = self._passed(fx, fy)
-        x, y = fx * side, fy * side
+        x, y = np.minimum(fx * side, 0.5), np.minimum(fy * side, 0.5)
         folded = np.zeros_like(fx)
         for k, m in product((0, *FOLDS), repeat=2):
             if k or m:
