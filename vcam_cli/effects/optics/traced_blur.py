@@ -103,9 +103,9 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
         known, place = self.wavefront.field, self.wavefront.place
         moved = np.array([abs(self._shift(w)) for w in wavelengths.tolist()])
         if not self.diffracts:
-            return moved + float(known.farthest[place])
-        spreads = [self.wavefront.spread(w) for w in wavelengths.tolist()]
-        return np.asarray(moved + np.array(spreads))
+            return np.asarray(moved + float(known.farthest[place]))
+        blurred = np.array([self.wavefront.spread(w) for w in wavelengths.tolist()])
+        return np.asarray(moved + blurred)
 
     def cutoff(self, wavelength: float) -> float:
         """Return the frequency from which the transfer is zero, or counts as zero [cycles/m]."""

@@ -241,4 +241,8 @@ FOLDS = (-2, -1, 1, 2)
 
 def _folded(turns: Array, k: int) -> Array:
     """Return what is left of a wave of f + k / d after the mean over cells, over that of f."""
-    return turns / (turns + k) if k else np.ones_like(turns)
+    if not k:
+        return np.ones_like(turns)
+    # A frequency of a multiple of the cells' lies outside what is folded: its value does not count.
+    found = np.divide(turns, turns + k, out=np.zeros_like(turns), where=turns != -k)
+    return np.asarray(found)
