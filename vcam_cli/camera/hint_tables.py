@@ -38,7 +38,6 @@ KEYS: Mapping[str, str] = {
         "optics.field_of_view: 60 deg",
     ),
     "na": "optics.numerical_aperture: 0.2",
-    **dict.fromkeys(("zemax", "zmx", "lens_file"), "optics.prescription: {file: lens.zmx}"),
     "transmission": "optics.transmittance: 0.95",
     "vignetting": "optics.off_axis: exact",
     "relative_illumination": "optics.off_axis: exact",

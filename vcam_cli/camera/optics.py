@@ -151,9 +151,11 @@ class Prescription(Model):
         default="best",
     )
     glasses: Annotated[
-        tuple[tuple[str, GivenGlass], ...],
+        tuple[tuple[str, Any], ...],  # name, GivenGlass: its keys stand below a name of the user's
         Either(
-            _glasses, dict[str, GivenGlass], yaml_form=lambda given: to_yaml(dict(given)) or None
+            _glasses,
+            dict[str, dict[str, float]],
+            yaml_form=lambda given: to_yaml(dict(given)) or None,
         ),
     ] = key(
         "glasses that the catalog does not have, by name",

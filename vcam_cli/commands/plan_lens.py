@@ -22,9 +22,10 @@ def plan_lens(
     from vcam_cli.simulation.lens_page import columns, lens_page, rows
     from vcam_cli.simulation.output import provenance
     from vcam_cli.simulation.output.lens_plot import plot_lens
+    from vcam_cli.solve.solved import solve
 
     model = load(camera, overrides)
-    page = lens_page(model)
+    page = lens_page(solve(model))
     path = out or Path("out") / f"{model.name}-lens"
     place = OutputFolder(path, record="lens.json", inputs=provenance.inputs(model))
     with place as folder:

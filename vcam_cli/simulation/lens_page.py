@@ -8,13 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.derived.geometry import geometry
-from vcam_cli.camera.derived.prescription import illumination, traced_lens
+from vcam_cli.camera.derived.prescription import illumination
+from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.optics.traced_blur import TracedBlur
 from vcam_cli.errors import bad
 from vcam_cli.lenses.analysis import Drawing, Spots, drawing, ideal_ratio, spots
 from vcam_cli.lenses.fields import View
+from vcam_cli.lenses.paraxial import paraxial
+from vcam_cli.solve.solved import Solved
 
 PLACES = 9
 """Image heights of the curves, from the center to the corner."""
@@ -60,25 +61,23 @@ class LensPage:
     """Paraxial focus at `wavelengths` behind that at the primary one (W,)."""
 
 
-def lens_page(camera: Camera) -> LensPage:
-    """Return what the lens of a camera does.
+def lens_page(solved: Solved) -> LensPage:
+    """Return what the lens of a solved camera does.
 
     Raises
     ------
     BadInput
         For a camera whose lens is not given by its prescription, or forms no image.
     """
-    traced = traced_lens(camera)
-    if traced is None:
+    traced = of_kind((e for e in solved.effects.found.values() if e is not None), TracedBlur)
+    if not traced:
         message = "is drawn where it is given by its surfaces"
         remedy = "write optics: {prescription: double-gauss}; `vcam list lenses` shows what ships"
         raise bad("optics", message, remedy)
-    solved = geometry(camera)
-    blur = TracedBlur.from_camera(camera, solved)
-    assert blur is not None
+    [blur] = traced
     view, corner = blur.view, blur.half_diagonal
     heights = np.linspace(0, corner, PLACES)
-    band = camera.scene.wavelengths
+    band = solved.scene.wavelengths
     waves = band.start + np.array(COLORS) * (band.stop - band.start)
     table = illumination(view, corner)
     places = blur.at_heights(heights)
@@ -86,7 +85,7 @@ def lens_page(camera: Camera) -> LensPage:
     primary = np.array([view.lens.primary])
     ratio = np.ones(PLACES)
     ratio[1:] = ideal_ratio(view, angles[1:], primary)[:, 0]
-    frequencies = tuple(part * 0.5 / solved.pitch_x for part in NYQUIST_PARTS)
+    frequencies = tuple(part * 0.5 / solved.geometry.pitch_x for part in NYQUIST_PARTS)
     light = np.linspace(band.start, band.stop, MTF_WAVELENGTHS)
     mtf = np.array(
         [
@@ -100,14 +99,12 @@ def lens_page(camera: Camera) -> LensPage:
         ]
     )
     first = view.paraxial
-    from vcam_cli.lenses.paraxial import paraxial
-
     focus = [paraxial(view.lens, float(w)).back_focus - first.back_focus for w in waves]
     shown = list(SHOWN)
     return LensPage(
         view,
         view.lens.title or view.lens.name,
-        _facts(view, solved.f_number, corner, float(angles[-1])),
+        _facts(view, solved.geometry.f_number, corner, float(angles[-1])),
         view.lens.remarks,
         heights,
         angles,
