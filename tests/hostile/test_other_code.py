@@ -160,13 +160,13 @@ def test_shares_of_one_folder_by_two_programs(tmp_path):
 @pytest.mark.parametrize("name", ["code", "vcam", "numpy", "scipy", "OpenImageIO"])
 @pytest.mark.parametrize("when", ["before", "meanwhile"])
 def test_a_worker_with_other_code_computes_nothing(tmp_path, monkeypatch, name, when):
-    """In a process of its own, or on a cluster: alike `compute_point`, wherever it runs."""
+    """In a process of its own, or on a cluster: alike `compute_points`, wherever it runs."""
     versions = point_work.versions()
     job = computation.Job("ab", load("starter"), (), (), {name: versions[name]})
     later = iter([versions if when == "meanwhile" else {}, {}])
     monkeypatch.setattr(point_work, "versions", lambda: next(later))
     monkeypatch.setattr(point_work, "simulate", lambda *_, **__: None)
-    outcome = point_work.compute_point(job, 1, Shared())
+    [outcome] = point_work.compute_points([job], 1, Shared())
     assert outcome.error.startswith(f"the worker has {name} None, the sweep {versions[name]}; ")
     assert not outcome.metrics
     assert not outcome.final

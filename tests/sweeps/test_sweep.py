@@ -390,18 +390,29 @@ class TestWorkers:
     def test_they_share_the_last_group(self):
         groups = [[f"{group}{point}" for point in range(4)] for group in "ab"]
         queue = workers.JobQueue(groups, lambda job: "compute")
-        assert [queue.next(worker) for worker in (0, 1, 0, 0, 0)] == ["a0", "b0", "a1", "a2", "a3"]
-        assert [queue.next(worker) for worker in (0, 1, 0)] == ["b1", "b2", "b3"]
-        assert queue.next(0) is None
-        assert queue.next(1) is None
+        order = [queue.next(worker) for worker in (0, 1, 0, 0, 0)]
+        assert order == [["a0"], ["b0"], ["a1"], ["a2"], ["a3"]]
+        assert [queue.next(worker) for worker in (0, 1, 0)] == [["b1"], ["b2"], ["b3"]]
+        assert queue.next(0) == queue.next(1) == []
+
+    @pytest.mark.parametrize(
+        ("seconds", "sizes"), [(0.0101, [1, 2, 4, 8, 10, 10]), (1.0, [1] * 6), (0.0, [1] * 6)]
+    )
+    def test_batches_take_a_tenth_of_a_second(self, seconds, sizes):
+        queue, found = workers.JobQueue([range(20), range(20, 99)], lambda job: "compute"), []
+        for _ in range(6):
+            found.append(queue.next(0))
+            queue.note([point_work.Outcome("", seconds=seconds)] * len(found[-1]))
+        assert [len(batch) for batch in found] == sizes
+        assert [job for batch in found for job in batch] == list(range(sum(sizes)))
 
     def test_points_that_others_have_claimed_come_last(self):
         verdicts = {"a": ["claimed", "claimed", "compute"], "b": ["finished"], "c": ["compute"]}
         queue = workers.JobQueue(["abc"], lambda job: verdicts[job].pop(0))
-        assert queue.next(0) == "c"
-        assert queue.next(0) is None
+        assert queue.next(0) == ["c"]
+        assert queue.next(0) == []
         assert queue.waiting
-        assert queue.next(0) == "a"
+        assert queue.next(0) == ["a"]
         assert not queue.waiting
 
     def test_threads_and_processes_fit_the_machine(self, monkeypatch):
@@ -418,7 +429,9 @@ def test_the_machinery_costs_little(tmp_path, monkeypatch):
         "start": "1 e", "stop": "9 e", "count": 100}})  # fmt: skip
     done = {"mean_electrons": 1.0, "snr_db": 2.0}
     monkeypatch.setattr(
-        workers, "compute_point", lambda job, *_: point_work.Outcome(job.id, metrics=dict(done))
+        workers,
+        "compute_points",
+        lambda jobs, *_: [point_work.Outcome(job.id, metrics=dict(done)) for job in jobs],
     )
     sweep(study, tmp_path / "warm", workers=1, shard=(1, 50))
     start = time.process_time()

@@ -28,8 +28,10 @@ _REASONS = {
 
 
 @contextmanager
-def write_whole(path: Path | str) -> Iterator[Path]:
+def write_whole(path: Path | str, is_flushed: bool = True) -> Iterator[Path]:
     """Yield a temporary name in the folder of `path`; on success the file gets its own name.
+
+    is_flushed: whether it is on the disk then; else see `delayed_flush`.
 
     The body writes the file under the temporary name and closes it. When the body raises,
     whatever it raises, the temporary file is removed and a former `path` stays as it was.
@@ -41,9 +43,11 @@ def write_whole(path: Path | str) -> Iterator[Path]:
     temporary = path.with_name(f".{path.name[:64]}.{mark}.part")
     try:
         yield temporary
-        _flush(temporary)
+        if is_flushed:
+            flush(temporary)
         os.replace(temporary, path)
-        flush_folder(path.parent)
+        if is_flushed:
+            flush_folder(path.parent)
     except OSError as error:
         raise cannot_write(path, error) from error
     finally:
@@ -51,18 +55,18 @@ def write_whole(path: Path | str) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
 
 
-def write_text(path: Path | str, text: str) -> None:
+def write_text(path: Path | str, text: str, is_flushed: bool = True) -> None:
     """Write `text` as UTF-8 with line feeds, whole or not at all. Raise CannotDo.
 
     Bytes of a file's name that are no text become escapes, which JSON understands.
     """
-    with write_whole(path) as temporary:
+    with write_whole(path, is_flushed) as temporary:
         temporary.write_text(text, "utf-8", "backslashreplace", newline="\n")
 
 
-def write_bytes(path: Path | str, data: bytes) -> None:
+def write_bytes(path: Path | str, data: bytes, is_flushed: bool = True) -> None:
     """Write bytes, whole or not at all. Raise CannotDo."""
-    with write_whole(path) as temporary:
+    with write_whole(path, is_flushed) as temporary:
         temporary.write_bytes(data)
 
 
@@ -111,7 +115,7 @@ def make_folder(folder: Path) -> None:
 def flush_folder(folder: Path) -> None:
     """Make renames in `folder` lasting, where the file system knows how to."""
     with suppress(OSError):
-        _flush(folder)
+        flush(folder)
 
 
 def cannot_write(path: Path | str, error: OSError) -> CannotDo:
@@ -127,7 +131,8 @@ def displayed_path(path: Path | str) -> str:
     return str(Path(*(part for part in path.parts if not part.startswith(STAGING))))
 
 
-def _flush(path: Path) -> None:
+def flush(path: Path) -> None:
+    """Have a file, or the names in a folder, on the disk."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)

@@ -6,7 +6,9 @@ A file is written whole, under the hash of all that the point depends on, with a
 and the hashes of the files beside it: what is there and agrees is finished, whoever wrote it. So a
 sweep may be killed at any moment, and several processes may work in one folder. They share the work
 through locks on single bytes of a file, one for each point, which the kernel drops when their
-holder dies; without such locks some points are computed twice, and nothing else happens.
+holder dies; without such locks some points are computed twice, and nothing else happens. A point
+that is kept survives whatever kills the process. It is on the disk within a second
+(`delayed_flush`): one that a power cut leaves in part is known by its check, and computed again.
 """
 
 import fcntl
@@ -22,6 +24,7 @@ from typing import Any, Self
 
 from vcam_cli.errors import CannotDo, bad
 from vcam_cli.files import atomic
+from vcam_cli.files.delayed_flush import DelayedFlush
 from vcam_cli.files.folder import is_foreign
 from vcam_cli.files.in_use import CLAIMS, POINTS, STUDIES, STUDIES_END, require_no_run
 from vcam_cli.files.records import (
@@ -61,6 +64,7 @@ class SweepFolder:
     def __init__(self, path: Path | str, record: str = RECORD) -> None:
         self.path = Path(path)
         self._record = record
+        self._flush = DelayedFlush(self.path / POINTS)
         self.corrupted: dict[str, None] = {}
         """Names of files of points that are not as they were written, in the order of reading."""
 
@@ -82,7 +86,10 @@ class SweepFolder:
         return self
 
     def __exit__(self, *_: object) -> None:
-        os.close(self._claims)
+        try:
+            self._flush.flush()
+        finally:
+            os.close(self._claims)
 
     def _holds_only_points(self) -> bool:
         """Tell whether the folder is of a sweep without a record yet, or of other machines."""
@@ -167,11 +174,15 @@ class SweepFolder:
         hashes = {}
         for name, data in (files or {}).items():
             hashes[name] = hashlib.sha256(data).hexdigest()
-            atomic.write_bytes(self.file(key, name), data)
+            self._put(self.file(key, name), data)
         entry = {"program": PROGRAM, "id": key, "point": content, "hashes": hashes}
         entry = json.loads(to_json(entry))  # numbers as they are read back
         text = to_json(entry | {"check": record_check(entry)})
-        atomic.write_text(self.file(key, "json"), text)
+        self._put(self.file(key, "json"), text.encode("utf-8", "backslashreplace"))
+
+    def _put(self, path: Path, data: bytes) -> None:
+        atomic.write_bytes(path, data, is_flushed=False)
+        self._flush.add(path)
 
     def file(self, key: str, name: str) -> Path:
         """Return the file of a name that is kept beside a point."""
@@ -248,6 +259,7 @@ class SweepFolder:
                 raise bad("--out", message, "choose another folder")
         contents = {name: atomic.written_bytes(name, write) for name, write in writers.items()}
         contents |= report(contents) if report else {}
+        self._flush.flush()
         written = {name: fingerprint(data) for name, data in contents.items()}
         with self._locked(_FINISHING):
             self._replace(contents, {**written, **(there or {})})

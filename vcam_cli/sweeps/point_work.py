@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 import traceback
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -63,15 +64,27 @@ class Job:
 
 
 @own_float_errors
-def compute_point(job: Task, threads: int, shared: Shared) -> Outcome:
-    """Return the outcome of a point; an error is one, an interrupt is not."""
+def compute_points(jobs: Sequence[Task], threads: int, shared: Shared) -> list[Outcome]:
+    """Return the outcomes of points of one study; an error is one, an interrupt is not.
+
+    That this process has the code of the one that asks is looked up before the first of them and
+    behind the last: modules are loaded where they are first needed.
+    """
+    try:
+        _check_versions(jobs[0])
+        outcomes = [_compute_point(job, threads, shared) for job in jobs]
+        _check_versions(jobs[0])
+    except CannotDo as error:
+        return [Outcome(job.id, error=str(error), final=False) for job in jobs]
+    return outcomes
+
+
+def _compute_point(job: Task, threads: int, shared: Shared) -> Outcome:
     start = time.perf_counter()
     trace, final = "", True
     try:
         with restore_interrupt():
-            _check_versions(job)
             metrics, frames = job.compute(threads, shared)
-            _check_versions(job)  # modules are loaded where they are first needed
         return Outcome(job.id, metrics, seconds=time.perf_counter() - start, frames=frames)
     except BadInput as error:
         message = error_cell(error.problems)
@@ -89,9 +102,9 @@ def compute_point(job: Task, threads: int, shared: Shared) -> Outcome:
 _SHARED = Shared()
 
 
-def compute_on_cluster(job: Task, tasks: int) -> Outcome:
-    """Compute a point in a process of a cluster that runs so many tasks at once."""
-    return compute_point(job, max(1, available_workers() // max(1, tasks)), _SHARED)
+def compute_on_cluster(jobs: Sequence[Task], tasks: int) -> list[Outcome]:
+    """Compute points in a process of a cluster that runs so many tasks at once."""
+    return compute_points(jobs, max(1, available_workers() // max(1, tasks)), _SHARED)
 
 
 def _check_versions(job: Task) -> None:

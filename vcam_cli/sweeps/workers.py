@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import os
 import subprocess
 import sys
@@ -31,15 +32,17 @@ from vcam_cli.errors import CannotDo
 from vcam_cli.memory import BLAS_VARIABLES
 from vcam_cli.parallel import ThreadPool, available_workers
 from vcam_cli.simulation.shared import Shared
-from vcam_cli.sweeps.point_work import Task, compute_on_cluster, compute_point
+from vcam_cli.sweeps.point_work import Task, compute_on_cluster, compute_points
 from vcam_cli.sweeps.sweep_result import Outcome
 
 Verdict = Literal["compute", "finished", "claimed"]
 Ask = Callable[[Task], Verdict]
 """Tells whether a point is to be computed, is finished, or is claimed by another process."""
 Groups = Sequence[Sequence[Task]]
-Submit = Callable[[int, Task], "Future[Outcome]"]
-"""Starts to compute a point on the worker of a number."""
+Batch = Sequence[Task]
+"""Points that a worker computes at once."""
+Submit = Callable[[int, Batch], "Future[list[Outcome]]"]
+"""Starts to compute points on the worker of a number."""
 
 SERVE = "import sys; sys.path[:] = {}; from vcam_cli.sweeps.workers import serve; serve({}, {})"
 """The program of a worker process: its path, the number of its connection, and of its threads."""
@@ -47,6 +50,10 @@ TRIES = 3
 """Number of worker processes that may die of the same point."""
 DEATH_TIMEOUT = 5.0
 """Seconds within which a process that has closed its connection must have ended."""
+BATCH_SECONDS, MOST = 0.1, 256
+"""Seconds that the points of a batch take together, about, and their number, at most. The scheduler
+of a cluster, and what is looked up once a batch, take some milliseconds. A worker that is killed
+loses its batch, or its one point."""
 POLL_INTERVAL = 0.2
 """Seconds between looks at points that other processes have claimed."""
 CONNECT_TIMEOUT = 5.0
@@ -56,28 +63,38 @@ WORKER_TIMEOUT = 60.0
 
 
 class JobQueue:
-    """The points that are left, handed out group by group."""
+    """The points that are left, handed out group by group, in batches."""
 
     def __init__(self, groups: Groups, ask: Ask) -> None:
         self._groups = deque(deque(group) for group in groups if group)
         self._ask = ask
         self._own: dict[int, deque[Task]] = {}
         self._claimed: deque[Task] = deque()
+        self._size = 1
 
     @property
     def waiting(self) -> bool:
         """Whether points of this sweep are claimed by other processes."""
         return bool(self._claimed)
 
-    def next(self, worker: int) -> Task | None:
-        """Return the next point of a worker; None while there is none."""
+    def next(self, worker: int) -> list[Task]:
+        """Return the next points of a worker; none while there are none."""
+        batch: list[Task] = []
         for job in self._candidates(worker):
             verdict = self._ask(job)
             if verdict == "compute":
-                return job
-            if verdict == "claimed":
+                batch.append(job)
+                if len(batch) == self._size:
+                    break
+            elif verdict == "claimed":
                 self._claimed.append(job)
-        return None
+        return batch
+
+    def note(self, outcomes: Sequence[Outcome]) -> None:
+        """Let the next batches be as long as `BATCH_SECONDS`, at the pace of these points."""
+        seconds = sum(outcome.seconds for outcome in outcomes) / max(len(outcomes), 1)
+        fitting = math.ceil(BATCH_SECONDS / seconds) if seconds > 0 else 1
+        self._size = max(1, min(fitting, 2 * self._size, MOST))
 
     def _candidates(self, worker: int) -> Iterator[Task]:
         claimed = len(self._claimed)
@@ -96,28 +113,31 @@ class JobQueue:
 
 def compute_here(groups: Groups, ask: Ask, threads: int) -> Iterator[Outcome]:
     """Compute one point after the other in this process."""
-    shared = Shared()
+    shared, queue = Shared(), JobQueue(groups, ask)
 
-    def submit(_: int, job: Task) -> Future[Outcome]:
-        future: Future[Outcome] = Future()
-        future.set_result(compute_point(job, threads, shared))
+    def submit(_: int, batch: Batch) -> Future[list[Outcome]]:
+        future: Future[list[Outcome]] = Future()
+        future.set_result(compute_points(batch, threads, shared))
         return future
 
-    for _, future in _run_points(JobQueue(groups, ask), [0], submit):
-        yield future.result()
+    for _, future in _run_points(queue, [0], submit):
+        queue.note(future.result())
+        yield from future.result()
 
 
 def compute_in_processes(groups: Groups, ask: Ask, count: int, threads: int) -> Iterator[Outcome]:
     """Compute points in processes of this machine, each with so many threads."""
     processes = [WorkerProcess(threads) for _ in range(count)]
+    queue = JobQueue(groups, ask)
     with ThreadPool(count) as pool:
 
-        def submit(worker: int, job: Task) -> Future[Outcome]:
-            return pool.submit(processes[worker].compute, job)
+        def submit(worker: int, batch: Batch) -> Future[list[Outcome]]:
+            return pool.submit(processes[worker].compute, batch)
 
         try:
-            for _, future in _run_points(JobQueue(groups, ask), range(count), submit):
-                yield future.result()
+            for _, future in _run_points(queue, range(count), submit):
+                queue.note(future.result())
+                yield from future.result()
         finally:
             for process in processes:
                 process.end()
@@ -145,16 +165,22 @@ def _compute_on_dask(
             for name, _ in slots
         ]
 
-        def submit(slot: int, job: Task) -> Future[Outcome]:
-            future: Future[Outcome] = executors[slot].submit(
-                compute_on_cluster, job, slots[slot][1]
+        def submit(slot: int, batch: Batch) -> Future[list[Outcome]]:
+            future: Future[list[Outcome]] = executors[slot].submit(
+                compute_on_cluster, batch, slots[slot][1]
             )
             return future
 
-        # Every slot has two points, so that it does not wait for the next one to be sent.
-        numbers = [*range(len(slots)), *range(len(slots))]
-        for job, future in _run_points(JobQueue(groups, ask), numbers, submit):
-            yield _outcome(job, future, lost)
+        # Every slot has two batches, so that it does not wait for the next one to be sent.
+        numbers, queue = [*range(len(slots)), *range(len(slots))], JobQueue(groups, ask)
+        for batch, future in _run_points(queue, numbers, submit):
+            found = _outcomes(batch, future, lost)
+            if found is None:  # each by itself: the one that kills its worker is lost alone
+                alone = [submit(0, [job]) for job in batch]
+                pairs = zip(batch, alone, strict=True)
+                found = [one for job, each in pairs for one in _outcomes([job], each, lost) or ()]
+            queue.note(found)
+            yield from found
     except (OSError, RuntimeError) as error:
         raise CannotDo(lost, "run the same command again") from error
     finally:
@@ -164,23 +190,23 @@ def _compute_on_dask(
 
 def _run_points(
     queue: JobQueue, workers: Sequence[int], submit: Submit
-) -> Iterator[tuple[Task, Future[Outcome]]]:
-    """Keep workers busy until no point is left; each number is there as often as it has points."""
+) -> Iterator[tuple[Batch, Future[list[Outcome]]]]:
+    """Keep workers busy until no point is left; each number is there as often as it has batches."""
     idle = deque(workers)
-    running: dict[Future[Outcome], tuple[int, Task]] = {}
+    running: dict[Future[list[Outcome]], tuple[int, Batch]] = {}
     while True:
         for worker in [idle.popleft() for _ in range(len(idle))]:
-            job = queue.next(worker)
-            if job is None:
-                idle.append(worker)
+            given = queue.next(worker)
+            if given:
+                running[submit(worker, given)] = worker, given
             else:
-                running[submit(worker, job)] = worker, job
+                idle.append(worker)
         if running:
             timeout = POLL_INTERVAL if queue.waiting else None
             for future in wait(running, timeout, FIRST_COMPLETED).done:
-                worker, job = running.pop(future)
+                worker, batch = running.pop(future)
                 idle.append(worker)
-                yield job, future
+                yield batch, future
         elif queue.waiting:
             time.sleep(POLL_INTERVAL)
         else:
@@ -188,7 +214,7 @@ def _run_points(
 
 
 class WorkerProcess:
-    """A process that computes one point at a time, replaced when it dies."""
+    """A process that computes one batch at a time, replaced when it dies."""
 
     def __init__(self, threads: int) -> None:
         self._threads = threads
@@ -197,19 +223,21 @@ class WorkerProcess:
         self._process: subprocess.Popen[bytes] | None = None
         self._connection: Connection
 
-    def compute(self, job: Task) -> Outcome:
-        """Compute a point; called by one thread at a time."""
+    def compute(self, batch: Batch) -> list[Outcome]:
+        """Compute points; called by one thread at a time."""
         how = ""
-        for _ in range(TRIES):
+        for _ in range(TRIES if len(batch) == 1 else 1):
             self._start()
             try:
-                self._connection.send(job)
-                outcome: Outcome = self._connection.recv()
-                return outcome
+                self._connection.send(batch)
+                outcomes: list[Outcome] = self._connection.recv()
+                return outcomes
             except (EOFError, OSError):
                 how = self._exit_text()
+        if len(batch) > 1:  # the point that it dies of fails alone
+            return [outcome for job in batch for outcome in self.compute([job])]
         message = f"its process died {TRIES} times ({how}); too little memory?"
-        return Outcome(job.id, error=message, final=False)
+        return [Outcome(job.id, error=message, final=False) for job in batch]
 
     def end(self) -> None:
         """End the process, whatever it does: each point that is finished has been sent."""
@@ -254,11 +282,14 @@ def serve(descriptor: int, threads: int) -> None:
     connection, shared = Connection(descriptor), Shared()
     with suppress(EOFError, OSError):
         while True:
-            connection.send(compute_point(connection.recv(), threads, shared))
+            connection.send(compute_points(connection.recv(), threads, shared))
 
 
-def _outcome(job: Task, future: Any, lost: str) -> Outcome:
-    """Return the outcome of a point that a cluster has, or has not, computed."""
+def _outcomes(batch: Batch, future: Any, lost: str) -> list[Outcome] | None:
+    """Return the outcomes of points that a cluster has, or has not, computed.
+
+    None for several points that were lost together.
+    """
     if future.cancelled():
         raise CannotDo(lost, "run the same command again")
     error = future.exception()
@@ -266,9 +297,12 @@ def _outcome(job: Task, future: Any, lost: str) -> Outcome:
         message = f"the Dask workers cannot import vcam: {error}"
         raise CannotDo(message, "install vcam there, in the same version")
     if error is not None:
-        return Outcome(job.id, error=f"lost on the cluster: {type(error).__name__}", final=False)
-    outcome: Outcome = future.result()
-    return outcome
+        if len(batch) > 1:
+            return None
+        message = f"lost on the cluster: {type(error).__name__}"
+        return [Outcome(job.id, error=message, final=False) for job in batch]
+    outcomes: list[Outcome] = future.result()
+    return outcomes
 
 
 @contextmanager
