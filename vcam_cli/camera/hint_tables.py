@@ -82,6 +82,7 @@ KEYS: Mapping[str, str] = {
     "cte": "pixel.readout.charge_transfer: {inefficiency: 3e-5, phases: 3}",
     "cti": "pixel.readout.charge_transfer: {inefficiency: 3e-5, phases: 3}",
     **dict.fromkeys(("crosstalk", "optical_crosstalk"), "pixel.crosstalk: {optical: 1 %}"),
+    **dict.fromkeys(("pdaf", "dual_pixel"), "pixel.phase_detection: dual"),
     "electrical_crosstalk": "pixel.crosstalk: {electrical: 0.5 %}",
     **dict.fromkeys(
         ("ipc", "interpixel_capacitance"), "pixel.crosstalk: {interpixel_capacitance: 0.5 %}"
@@ -329,10 +330,6 @@ NOT_SIMULATED: Mapping[str, str] = {
     ),
     "smear": "charge is transferred in no time, and collects no light meanwhile",
     "flash": "the light of the scene is scene.illuminant at one level",
-    **dict.fromkeys(
-        ("phase_detection", "pdaf", "dual_pixel"),
-        "the autofocus, optics.focus: auto, goes by contrast",
-    ),
     **dict.fromkeys(
         ("stabilization", "image_stabilization", "optical_stabilization"),
         "the camera moves as scene.camera_motion says",

@@ -111,6 +111,7 @@ class CameraModel(FileModel):
             *code_mistakes(self.processing, render),
             *self._capture_mistakes(),
             *self._crosstalk_mistakes(),
+            *self._phase_mistakes(),
             *unmeasured_mistakes(
                 self.expect, self.quality, self.has_edge, self.exposure.has_samples
             ),
@@ -174,6 +175,28 @@ class CameraModel(FileModel):
             if refused:
                 message = f"is not simulated with {what}"
                 yield fault((*path, "interpixel_capacitance"), message, f"{remedy}, or remove it")
+
+    def _phase_mistakes(self) -> Iterator[InitErrorDetails]:
+        """Yield why halves of the lens cannot be told apart."""
+        given, array, readout = self.pixel.phase_detection, self.array, self.pixel.readout
+        if given is None:
+            if self.output.phase:
+                message = "there are no pixels that see one half of the lens"
+                yield fault(("output", "phase"), message, "add pixel.phase_detection: dual")
+            return
+        binned = array.binning is not None and array.binning.count > 1
+        scattered = array.is_scattered or array.pattern == "stacked"
+        several = bool(readout.gains) or readout.small is not None
+        for refused, what, remedy in (
+            (not self.optics.is_lens, "a bare sensor", "describe a lens in optics"),
+            (scattered, "stacked or scattered pixels", "write another array.pattern"),
+            (binned, "binned pixels", "remove array.binning"),
+            (self.exposure.captures, "captures", "give one exposure time"),
+            (several, "several readouts", "remove readout.gains and readout.small"),
+        ):
+            if refused:
+                message = f"is not simulated with {what}"
+                yield fault(("pixel", "phase_detection"), message, remedy)
 
     @property
     def has_edge(self) -> bool:

@@ -250,6 +250,11 @@ class Output(Model):
         " after that step; linear before gamma",
         default=False,
     )
+    phase: Annotated[bool, Strict()] = key(
+        "also write phase.exr, what halves of pixels (pixel.phase_detection) read, channels left"
+        " and right [DN], and disparity.png, by how many pixels the two differ",
+        default=False,
+    )
     report: Annotated[bool, Strict()] = key(
         "also write report.html: pictures, plan, noise, spectra, sharpness and origin on one page",
         default=False,

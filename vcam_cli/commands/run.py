@@ -132,6 +132,8 @@ def exposure_lines(exposure: dict[str, Any]) -> list[str]:
 FILES = {
     "render.png": "render",
     "raw.exr": "raw frame",
+    "phase.exr": "left and right halves",
+    "disparity.png": "disparity",
     "raw.dng": "raw frame",
     "raw.tif": "raw frame",
     "ideal.exr": "ideal image",

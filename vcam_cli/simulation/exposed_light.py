@@ -22,7 +22,7 @@ from vcam_cli.effects.base import (
 )
 from vcam_cli.effects.signal_chain import Limit, NoiseSource, extreme_signal
 from vcam_cli.floats import rms
-from vcam_cli.image_formation import photon_rate, pixelwise, timed_gains
+from vcam_cli.image_formation import half_images, photon_rate, pixelwise, timed_gains
 from vcam_cli.image_formation.light_plan import PERCENTILES, LightPlan
 from vcam_cli.image_formation.neighbor_sharing import Sharing, array_sharing
 from vcam_cli.readout import auto_exposure, exposure, sample_times
@@ -56,6 +56,8 @@ class ExposedLight:
     """As `Prepared.full_charge`."""
     white_rate: Array
     """As `Prepared.white_rate`."""
+    halves: tuple[Array, Array] | None
+    """As `Prepared.halves`."""
     sharing: Sharing | None
     """As `Prepared.sharing`."""
     effects: tuple[Effect, ...]
@@ -126,6 +128,18 @@ def expose(seen: SceneLight, light: photon_rate.Rate) -> ExposedLight:
         full_charge = _full_charge(groups, lit, rate, pixel_dark, effects, full_rate) * time
     moving = of_kind(effects, ImageMotion)
     steps = pairwise((0.0, *times)) if timed or moving else ()
+    halves = None
+    if (phase := solved.pixel.phase_detection) is not None:
+        whole, defocus = light.plan.reduced(path), solved.geometry.focus_shift
+        radius = (solved.optics.defocus + defocus) / (2 * solved.geometry.working_f_number)
+
+        def of_half(half: int) -> Array:
+            part = half_images.half_path(whole, radius, half)
+            return collect(photon_rate.photo_rate(part, seen.scene).values, 0.0, time)
+
+        halves = half_images.half_rates(rate, phase.separation, of_half)
+        if phase.masked is not None:
+            rate = half_images.masked(rate, halves, phase.masked)
     step_rates = tuple(
         collect(light_during(seen, light, start, stop), start, stop) for start, stop in steps
     )
@@ -158,6 +172,7 @@ def expose(seen: SceneLight, light: photon_rate.Rate) -> ExposedLight:
     return ExposedLight(
         *(rate, times, signal, chosen, changes, light_plan, step_rates, full_charge),
         white_rate=white_rate,
+        halves=halves,
         sharing=sharing,
         effects=effects,
     )

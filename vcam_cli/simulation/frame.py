@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
 
@@ -12,7 +12,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.scene.sources import Layers
 from vcam_cli.effects.base import Gain, of_kind
 from vcam_cli.floats import own_float_errors
-from vcam_cli.image_formation import warps
+from vcam_cli.image_formation import half_images, warps
 from vcam_cli.image_formation.pixel_response import axis_levels
 from vcam_cli.progress import Stages
 from vcam_cli.readout import (
@@ -45,6 +45,8 @@ class Frame(Prepared):
     """(N, rows, columns) as `dn`; None of a single exposure."""
     readouts_dn: Mapping[str, Array] = field(default_factory=dict)
     """Codes of every readout of an exposure by its name, as `dn`; {} where there is one."""
+    phase_dn: tuple[Array, Array] | None = None
+    """Codes (rows, columns) of the left and right halves of pixels [DN]; None of whole pixels."""
     photocurrent: Array | None = None
     """(rows, columns) what the samples tell of the light [e/s]; None of a single exposure."""
 
@@ -72,7 +74,10 @@ class Frame(Prepared):
         well nor ADC had an end, and without rounding. So the scale is that of the last sample.
         """
         if self.photocurrent is None:
-            return self.dn
+            phase = self.solved.pixel.phase_detection
+            if phase is None or phase.masked is None:
+                return self.dn
+            return half_images.unmasked(self.dn, phase.masked, len(self.mosaic.block[0]))
         return self._unclipped_codes(self.photocurrent)
 
     @property
@@ -197,6 +202,27 @@ def _pedestal(ready: Prepared) -> Array | None:
     return pedestal
 
 
+def _phase_codes(
+    ready: Prepared, dn: Array, take: Callable[..., tuple[Array, Array]]
+) -> tuple[Array, Array] | None:
+    """Return the codes of the pixels' halves; those of masked pixels are in the raw frame.
+
+    Halves have draws of their own, as further layers of a stack would: the raw frame's codes are of
+    whole pixels, and not the sum of these.
+    """
+    phase = ready.solved.pixel.phase_detection
+    if ready.halves is None or phase is None:
+        return None
+    if phase.masked is not None:
+        of_left, of_right = half_images.sites(phase.masked)
+        return dn[of_left], dn[of_right]
+    time, active = ready.exposure_time, ready.plan.active
+    left, right = (
+        take(half, time, active, layer=number)[1] for number, half in enumerate(ready.halves, 1)
+    )
+    return left, right
+
+
 def take_frame(ready: Prepared, workers: int, stages: Stages | None = None) -> Frame:
     """Return one frame of a camera that is ready for it."""
     stages, solved = stages or Stages(), ready.solved
@@ -225,7 +251,9 @@ def take_frame(ready: Prepared, workers: int, stages: Stages | None = None) -> F
             electrons, dn = binned_readout.read(
                 groups, ready.rate, time, active, take, adc.bits, ready.full_charge
             )
-            return Frame(**known, electrons=electrons, dn=dn)
+            return Frame(
+                **known, electrons=electrons, dn=dn, phase_dn=_phase_codes(ready, dn, take)
+            )
         electrons, dn = nondestructive_samples.samples(
             *(ready.rate, times, active, adc, seeds, workers),
             step_rates=ready.step_rates,

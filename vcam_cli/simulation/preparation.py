@@ -64,6 +64,9 @@ class Prepared:
     full_charge: Array | None
     """Electrons that every node is read with if it is full, in the shape of `rate`, where transfer
     defers some of them [electrons]; None elsewhere: all of the full well."""
+    halves: tuple[Array, Array] | None
+    """Photo-electrons per second (rows, columns) of the pixels' left and right halves [e/s]; None
+    of pixels that do not tell the halves of the lens apart."""
     sharing: Sharing | None
     """What pixels give to their neighbors; None where they give nothing."""
 
@@ -164,6 +167,8 @@ def plan_frame(
     if of_kind(exposed.effects, ImageMotion):  # every sample has light of its own
         once = cost_model.light_seconds(solved.layout, light.spectrum, run.workers)
         run = run.after(len(exposed.times) * once)
+    if exposed.halves is not None:
+        run = run.after(2 * cost_model.light_seconds(solved.layout, light.spectrum, run.workers))
     decided = _with_seconds(solved, light, decided, run)
     run.stages.watch.expect(decided.seconds)
     return Prepared(
@@ -179,6 +184,7 @@ def plan_frame(
         plan=decided,
         step_rates=exposed.step_rates,
         full_charge=exposed.full_charge if of_kind(decided.active, Limit) else None,
+        halves=exposed.halves,
         sharing=exposed.sharing,
     )
 

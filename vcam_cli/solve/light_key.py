@@ -18,7 +18,7 @@ from vcam_cli.solve.settings import camera_settings
 OTHER_KEYS = (
     *("name", "seed", "exposure", "processing", "quality", "output"),
     *("display.dpi", "display.width", "display.viewing_distance"),
-    *("array.binning", "pixel.readout.gain", "pixel.readout.timing"),
+    *("array.binning", "pixel.phase_detection", "pixel.readout.gain", "pixel.readout.timing"),
     *(f"pixel.readout.{key}" for key in ("gains", "merge", "small")),
 )
 """Keys behind the light that belong to no effect. Exposure, ADC and analog gain set the level at

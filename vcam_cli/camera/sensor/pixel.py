@@ -16,6 +16,7 @@ from vcam_cli.camera.sensor.noise import (
     PatternShading,
     TelegraphNoise,
 )
+from vcam_cli.camera.sensor.phase_detection import PHASE_DETECTION, PhaseDetection
 from vcam_cli.camera.sensor.photodetector import Photodetector
 from vcam_cli.camera.sensor.several_readouts import GAINS, SmallPhotodiode
 from vcam_cli.camera.sensor.technology import CHOICE, TechnologyChoice
@@ -355,6 +356,12 @@ class Pixel(Model):
     )
     microlens: Annotated[Microlens | None, word_or(Microlens, {"none": None})] = key(
         "a lens on every pixel", example="none", default=None
+    )
+    phase_detection: Annotated[PhaseDetection | None, PHASE_DETECTION] = key(
+        "pixels that see one half of the lens: dual (each in a left and a right half), or"
+        " {masked: {period: [16, 16], offset: [4, 4]}}; output.phase writes what they see",
+        example="dual",
+        default=None,
     )
     crosstalk: Annotated[Crosstalk | None, word_or(Crosstalk, {"none": None})] = key(
         "what a pixel gives to its neighbors", example="none", default=None

@@ -34,7 +34,7 @@ from vcam_cli.processing.color_correction import CHROMATICITIES
 from vcam_cli.simulation import scene_radiance, spectral_irradiance
 from vcam_cli.simulation.figures import exposure_report
 from vcam_cli.simulation.frame import Frame
-from vcam_cli.simulation.output import isetcam_files, provenance, raw_dng, raw_file
+from vcam_cli.simulation.output import isetcam_files, phase_files, provenance, raw_dng, raw_file
 from vcam_cli.simulation.output.provenance import versions
 from vcam_cli.simulation.output.raw_file import ROWS_AT_ONCE
 from vcam_cli.simulation.photograph import Photograph
@@ -184,6 +184,9 @@ def _raw_jobs(result: Photograph, folder: OutputFolder) -> Iterator[Callable[[],
     yield partial(write_raw, result, folder.new("raw.exr"))
     frame = result.frame
     said = config_hash(frame.camera)
+    if frame.phase_dn is not None and frame.solved.output.phase:
+        yield partial(phase_files.write_phase, folder.new("phase.exr"), frame, said)
+        yield partial(phase_files.write_disparity, folder.new("disparity.png"), frame)
     if frame.solved.output.dng:
         description = raw_file.description(frame, said)
         yield partial(raw_dng.write_raw_dng, folder.new("raw.dng"), frame, description)

@@ -1,0 +1,96 @@
+"""Blur by defocus of the light through one half of the lens.
+
+    H(f) = 2 / (pi R^2) integral_0^|R| 2 h(x) sinc(2 h f_y) exp(-2 pi i s f_x x) dx,
+    h(x) = sqrt(R^2 - x^2)
+
+R is the radius of the blur of the whole lens, s the side on which the half's rays land: half a
+disk, whose center of gravity lies 4 R / (3 pi) from the point's place. Two halves so have the
+disparity 8 R / (3 pi), 4 / (3 pi) of the blur's diameter.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from vcam_cli.arrays import Array
+from vcam_cli.effects.base import Effect, PlaneTransfer
+from vcam_cli.effects.optics.wavefront_blur import AberrationBlur
+
+LEFT, RIGHT = 1, -1
+"""Side of the picture on which light of something near lands by each half of the lens, as the
+photographer sees it: rays of the left half have not crossed yet, and the picture is upright."""
+LEAST = 1e-9
+"""Radius of a blur below which there is none [m]."""
+
+
+@dataclass(frozen=True)
+class HalfPupil(AberrationBlur, PlaneTransfer):
+    """Defocus seen through one half of a round pupil, in place of the lens's aberrations.
+
+    Diffraction is a factor beside it, as that of the whole lens: by a half, contrast across the
+    halves falls somewhat more. Aberrations other than defocus displace no phase here, and pupils
+    cut by vignetting off the axis have the halves of round ones.
+    """
+
+    radius: float
+    """Of the whole lens's blur; positive where things are nearer than what is in focus [m]."""
+    half: int
+    """LEFT or RIGHT."""
+
+    @classmethod
+    def from_camera(cls, camera: object, geometry: object) -> None:
+        """Return None: it is an effect of a half's image, not of a camera's."""
+        return
+
+    def describe(self) -> str:
+        """Return a short clause with this half's numbers and units."""
+        moved = self.half * 4 * self.radius / (3 * math.pi)
+        return f"half a lens moves points by {moved * 1e6:.4g} um"
+
+    @property
+    def reach(self) -> float:
+        """How far the blur throws light [m]."""
+        return abs(self.radius)
+
+    def cutoff(self, wavelength: float) -> float:
+        """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
+        return np.inf
+
+    def otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
+        """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: (m, n)."""
+        radius, side = abs(self.radius), self.half * math.copysign(1, self.radius)
+        highest = max(np.abs(fx).max(initial=0.0), np.abs(fy).max(initial=0.0))
+        # x = R sin t: no root at the rim. Gauss's rule needs some points for every wave across R.
+        node, weight = np.polynomial.legendre.leggauss(24 + math.ceil(8 * highest * radius))
+        t = (node + 1) * math.pi / 4
+        x, h = radius * np.sin(t), radius * np.cos(t)
+        share = weight * np.cos(t) ** 2  # sums to 1 over half a disk, but for rounding
+        down = share * np.sinc(2 * np.outer(fy, h))
+        across = np.exp(-2j * np.pi * side * np.outer(x, fx))
+        found: Array = (down @ across) / share.sum()
+        return found
+
+
+def halved(effects: Iterable[Effect], radius: float, half: int) -> tuple[Effect, ...]:
+    """Return effects of a lens as one half of it has them.
+
+    Parameters
+    ----------
+    effects : iterable of Effect
+        Effects in the order of action.
+    radius : float
+        Radius of the whole lens's blur; positive where things are nearer than the focus [m].
+    half : int
+        LEFT or RIGHT.
+
+    Returns
+    -------
+    tuple of Effect
+        The same, defocus by half a pupil in place of aberrations.
+    """
+    kept = tuple(effect for effect in effects if not isinstance(effect, AberrationBlur))
+    return kept if abs(radius) < LEAST else (HalfPupil(radius, half), *kept)

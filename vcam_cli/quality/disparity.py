@@ -1,0 +1,73 @@
+"""By how many pixels two pictures of one scene differ along rows, place by place.
+
+    d(x) = argmin sum_w (left(x + w + d / 2) - right(x + w - d / 2))^2,   w in a window
+
+Whole shifts are tried, and a parabola through the least sum and its neighbors has the rest. The
+sums are over the sum of squared gradients where windows have no detail: NaN there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vcam_cli.arrays import Array
+
+WINDOW = 15
+"""Pixels along the side of a window."""
+LEAST_DETAIL = 25.0
+"""Least mean square of differences of neighbors in a window, over that of their noise, at which a
+shift can be told: below it a window's best shift is that of its noise."""
+
+
+def disparity(left: Array, right: Array, most: int, noise: Array | float = 0.0) -> Array:
+    """Return the disparity of two pictures.
+
+    Parameters
+    ----------
+    left, right : Array
+        Pictures (rows, columns), in one unit.
+    most : int
+        Largest disparity that is looked for [pixels].
+    noise : Array or float, optional
+        Variance of both pictures' difference by noise, in that unit squared.
+
+    Returns
+    -------
+    Array
+        Disparity (rows, columns), position in `left` less that in `right` [pixels]; NaN where
+        nothing tells it.
+    """
+    from scipy.ndimage import uniform_filter
+
+    left, right = (np.asarray(side, float) for side in (left, right))
+    shifts = np.arange(-most - 1, most + 2)
+    costs = np.array(
+        [uniform_filter(_differences(left, right, s) ** 2, WINDOW) for s in shifts.tolist()]
+    )
+    best = np.clip(costs.argmin(axis=0), 1, len(shifts) - 2)
+    before, least, after = (
+        np.take_along_axis(costs, (best + step)[None], axis=0)[0] for step in (-1, 0, 1)
+    )
+    bend = before - 2 * least + after
+    offset = np.where(bend > 0, (before - after) / np.where(bend > 0, 2 * bend, 1), 0.0)
+    detail = uniform_filter(np.gradient(left + right, axis=1) ** 2, WINDOW)
+    told = (detail > LEAST_DETAIL * np.asarray(noise)) & (bend > 0)
+    return np.where(told, shifts[best] + offset, np.nan)
+
+
+def _differences(left: Array, right: Array, shift: int) -> Array:
+    """Return left(x + shift / 2) - right(x - shift / 2), mirrored at the border.
+
+    An odd shift is taken one pixel more on one side, and averaged with the other way.
+    """
+    low, high = shift // 2, -(-shift // 2)
+    one = _moved(left, high) - _moved(right, -low)
+    if low == high:
+        return one
+    return (one + _moved(left, low) - _moved(right, -high)) / 2
+
+
+def _moved(picture: Array, by: int) -> Array:
+    """Return picture(x + by) with its border going on."""
+    columns = np.arange(picture.shape[1]) + by
+    return picture[:, np.clip(columns, 0, picture.shape[1] - 1)]
