@@ -52,15 +52,16 @@ class FakeFuture:
 
 def test_what_becomes_of_a_task():
     job = Job("ab", None, (), (), {})
-    assert workers._outcome(job, FakeFuture(), "lost") == "outcome"
-    given_up = workers._outcome(job, FakeFuture(RuntimeError("killed")), "lost")
+    assert workers._outcomes([job], FakeFuture(), "lost") == "outcome"
+    [given_up] = workers._outcomes([job], FakeFuture(RuntimeError("killed")), "lost")
     assert given_up.id == "ab"
     assert given_up.error
     assert not given_up.final
+    assert workers._outcomes([job, job], FakeFuture(RuntimeError("killed")), "lost") is None
     with pytest.raises(CannotDo, match="lost"):
-        workers._outcome(job, FakeFuture(cancelled=True), "lost")
+        workers._outcomes([job], FakeFuture(cancelled=True), "lost")
     with pytest.raises(CannotDo, match="install vcam"):
-        workers._outcome(job, FakeFuture(ModuleNotFoundError("vcam_cli")), "lost")
+        workers._outcomes([job], FakeFuture(ModuleNotFoundError("vcam_cli")), "lost")
 
 
 @pytest.mark.long

@@ -245,8 +245,10 @@ def _of_word(word: str) -> Iterator[dict[str, Any]]:
     from vcam_cli.commands import glossary
     from vcam_cli.sweeps.quantities import QUANTITIES, unit
 
-    tables = [name for name, columns in glossary.written().items() if word in columns]
     about = glossary.COLUMNS.get(word)
+    # Which tables have a column only their writers know: they bring the engine with them.
+    written = glossary.written() if about else {}
+    tables = [name for name, columns in written.items() if word in columns]
     if tables and about:
         entry = {"title": f"{word} (column)", "about": _sentence(about)}
         yield entry | {"in": ", ".join(tables)}
@@ -256,7 +258,7 @@ def _of_word(word: str) -> Iterator[dict[str, Any]]:
         about += f" [{unit(word)}]" if unit(word) else ""
         if _keys_called(word):  # which is explained as a key
             about = None
-    if about is not None and not (tables and word in glossary.COLUMNS):
+    if about is not None and not tables:
         yield {"title": word, "about": _sentence(about)}
 
 

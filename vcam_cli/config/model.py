@@ -43,7 +43,7 @@ class Model(BaseModel):
     """A mapping of a file."""
 
     model_config = ConfigDict(
-        extra="forbid", frozen=True, allow_inf_nan=False, protected_namespaces=()
+        extra="forbid", frozen=True, allow_inf_nan=False, protected_namespaces=(), defer_build=True
     )
     rules: ClassVar[tuple[Rule, ...]] = ()
 

@@ -20,7 +20,6 @@ from functools import partial
 from typing import Final
 
 import numpy as np
-from scipy import ndimage
 
 from vcam_cli import memory
 from vcam_cli.arrays import Array
@@ -89,6 +88,8 @@ class FineImage:
         Array
             Signal in that shape [e/s].
         """
+        from scipy import ndimage
+
         g = self.geometry
         pitches = g.pitch_x * g.sampling_scale, g.pitch_y * g.sampling_scale
         column = (x - g.collecting_x) / pitches[0] + (g.columns - 1) / 2
@@ -256,6 +257,8 @@ def _add(values: Array, layer: Layer, x: Array, y: Array, rows: slice) -> None:
 
 def _filter_plane(values: Array, color: int) -> None:
     """Put the coefficients of splines in the place of the values of a color."""
+    from scipy import ndimage
+
     values[color] = ndimage.spline_filter(
         values[color], order=ORDER, output=values.dtype, mode="mirror"
     )
@@ -266,6 +269,8 @@ def _error_between(plane: Array) -> float:
 
     Along each axis by itself, on some lines; of the two together the sum of squares.
     """
+    from scipy import ndimage
+
     squares = 0.0
     for values in (plane, plane.T):
         some = values[:: max(1, len(values) // LINES)]
@@ -282,6 +287,8 @@ def _error_between(plane: Array) -> float:
 
 def _between(coefficients: Array, at: Array) -> Array:
     """Return splines along the second axis, of coefficients (m, n), at places (p,): (m, p)."""
+    from scipy import ndimage
+
     return np.array(
         [
             ndimage.map_coordinates(line, [at], order=ORDER, prefilter=False, mode="mirror")

@@ -16,7 +16,6 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 
 from vcam_cli.arrays import Array
@@ -191,7 +190,9 @@ def _by_direction(
     highest, step = float(frequency[within].max(initial=0.0)), float(frequency[1])
     right, down, share = _rays(highest, working_f_number, rest)
     # A wave of any of the frequencies repeats after 1 / step: so may the cells.
-    cells = scipy.fft.next_fast_len(math.ceil(CELLS_PER_CYCLE * max(highest, 1 / radius) / step))
+    from scipy.fft import next_fast_len
+
+    cells = next_fast_len(math.ceil(CELLS_PER_CYCLE * max(highest, 1 / radius) / step))
     spread = np.sinc(frequency[within] / (cells * step)) ** 4
 
     def values(angles: Floats) -> Array:

@@ -23,7 +23,6 @@ References
 from collections.abc import Callable
 
 import numpy as np
-from scipy import linalg, ndimage
 
 from vcam_cli.scheduling.pdf import Floats
 
@@ -49,6 +48,8 @@ def kernel(counts: Floats) -> Floats:
     (K,) array
         Probability of each bin, sum 1.
     """
+    from scipy import ndimage
+
     total, place = counts.sum(), np.arange(counts.size)
     mean = counts @ place / total
     deviation = np.sqrt(counts @ (place - mean) ** 2 / total)
@@ -117,6 +118,8 @@ def penalized_likelihood(counts: Floats) -> Floats:
 
 def _penalized_fit(counts: Floats, strength: float) -> tuple[Floats, float]:
     """Return the fitted means (K,), and their AIC."""
+    from scipy import linalg, ndimage
+
     penalty = strength * _second_differences(counts.size)
     least = LEAST_MEAN * counts.sum()
     smooth = np.maximum(ndimage.uniform_filter1d(counts, 5, mode="nearest"), 0.5)
@@ -174,6 +177,8 @@ def _times(band: Floats, values: Floats) -> Floats:
 
 def _inverse_diagonal(band: Floats) -> Floats:
     """Return the diagonal of the inverse of a positive definite band matrix."""
+    from scipy import linalg
+
     factor = linalg.cholesky_banded(band)
     size = band.shape[1]
     found = np.empty(size)

@@ -10,14 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vcam_cli.camera.scene.illuminant import IlluminantSpec
 from vcam_cli.camera.scene.scene import Scene
 from vcam_cli.scenes.hyperspectral import DEFAULT_ILLUMINANT, Bands, Cube, covers
-from vcam_cli.solve.solved import Solved
 from vcam_cli.spectra import Spectrum, pair_weights, photons
+
+if TYPE_CHECKING:  # checks of a file need no more than its bands
+    from vcam_cli.solve.solved import Solved
 
 
 def completed(solved: Solved, cube: Cube) -> tuple[Cube, tuple[str, ...]]:
