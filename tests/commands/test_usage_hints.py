@@ -40,7 +40,7 @@ def said(tmp_path, *arguments):
         ("run mine.yaml --resume", "the same command goes on"),
         ("run mine.yaml --jobs 2", "--workers"),
         ("run mine.yaml --exposure 1", "--set"),
-        ("list lens", "did you mean parts?"),
+        ("list lens", "did you mean lenses?"),
     ],
 )
 def test_what_is_meant(arguments, meant, tmp_path):
