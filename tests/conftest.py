@@ -18,7 +18,16 @@ settings.load_profile("vcam")
 
 
 @pytest.fixture(autouse=True)
-def nothing_kept():
-    """Forget the light of the last simulations, where any were made."""
+def nothing_kept(request, monkeypatch):
+    """Keep no light from one simulation to the next, but in tests of what is kept.
+
+    Tests that change the engine between two frames of one camera would compare one light.
+    """
+    if "keeps_light" in request.keywords:
+        from vcam_cli.simulation.shared import RECENT
+
+        RECENT.clear()
+        return
     if module := sys.modules.get("vcam_cli.simulation.shared"):
+        monkeypatch.setattr(module, "KEPT", 0)
         module.RECENT.clear()

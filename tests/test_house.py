@@ -285,7 +285,7 @@ READS_CAMERAS = {
     "simulation.planned", "simulation.sequence", "simulation.exposure_control",
     "simulation.scene_times", "simulation.bracket",  # who simulates a camera
     "simulation.checks", "simulation.scene_files", "simulation.spectral_irradiance",
-    "simulation.scene_radiance", "simulation.lens_page",
+    "simulation.scene_radiance",
     "simulation.output.isetcam_files", "simulation.output.raw_dng",  # who checks or reads its files
     "simulation.output.outputs", "simulation.output.provenance",  # who says where a frame is from
 }  # fmt: skip

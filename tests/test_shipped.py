@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 from vcam_cli import load, simulate
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.derived.readouts import readouts
+from vcam_cli.camera.sensor.noise import at_gain
 from vcam_cli.capture_schedules import schedule_file
 from vcam_cli.commands.list_ import first_comment
 from vcam_cli.commands.main import app
@@ -119,7 +120,7 @@ class TestCameras:
             assert 1e3 <= e.full_well <= 2e5
             assert 8 <= e.bits <= 16
             assert e.adc_full_scale / 2**e.bits < e.electrons_per_dn * 1.5
-            assert readout.camera.pixel.readout.read_noise_at(1.0) < 0.01 * e.full_well
+            assert at_gain(readout.camera.pixel.readout.read_noise, 1.0) < 0.01 * e.full_well
 
 
 def test_the_benchmark_camera():
@@ -136,13 +137,14 @@ def test_the_benchmark_camera():
 def test_everything_has_every_effect_of_its_architecture():
     """But for what a CCD has, depth, which is of a scene, and what its read noise includes.
 
-    Its lens is one that does not distort: the figures of README are of that.
+    Its lens does not distort and its pixels have no crosstalk: the figures of README are of that.
     """
     camera = load("everything")
     described = camera_effects(camera, geometry(camera)).found
     missing = {name for name, effect in described.items() if effect is None}
     assert missing == {
         "charge_transfer", "reset_noise", "depth", "adc_noise", "distortion", "lateral_color",
+        "crosstalk",
     }  # fmt: skip
     assert camera.effects == "auto"
 

@@ -50,6 +50,7 @@ CHANGES = {
     "pixel.readout.charge_transfer": {"inefficiency": 1e-3},
     "pixel.readout.timing": {"pixel_time": "1 us"},
     "pixel.readout.gains": [1, 8],
+    "pixel.phase_detection": "dual",
     "pixel.readout.merge": "switch",
     "pixel.readout.small": {"sensitivity": "1 %", "full_well": "60 ke"},
     "pixel.photodetector.dark_current": "900 e/s",
@@ -93,7 +94,7 @@ def test_the_light_does_not_depend_on_it(tmp_path, path, monkeypatch):
     )
     for each in (plain, made):
         simulate(each, 1, shared=Shared())
-    a, b = found
+    a, b, *_ = found  # of pixels that see half of the lens the light of the halves follows
     assert a.values.tobytes() == b.values.tobytes()
     assert a.spectrum == b.spectrum
 
@@ -173,6 +174,7 @@ def test_what_an_effect_contributes_is_told_of_shared_light_too(tmp_path):
         assert kept.frame.plan == alone.frame.plan
 
 
+@pytest.mark.keeps_light
 def test_a_loop_shares_light_without_being_told(tmp_path, brought):
     made = camera(tmp_path, BASE)
     results = [simulate(made.with_({"exposure.time": f"{n} ms"}), 1) for n in (1, 2, 3)]
@@ -184,12 +186,14 @@ def test_a_loop_shares_light_without_being_told(tmp_path, brought):
     assert results[-1].metrics == alone.metrics
 
 
+@pytest.mark.keeps_light
 def test_light_that_is_shared_cannot_be_written_into(tmp_path):
     result = simulate(camera(tmp_path, BASE), 1)
     with pytest.raises(ValueError, match="read-only"):
         result.frame.rate[:] = 0
 
 
+@pytest.mark.keeps_light
 @pytest.mark.parametrize("changed", ["picture.png", "lamp.csv"])
 def test_a_file_that_changes_is_read_again(tmp_path, changed):
     """The picture, and a lamp's spectrum, each of which light depends on."""
@@ -218,6 +222,7 @@ def test_a_file_that_changes_is_read_again(tmp_path, changed):
     assert after.electrons.tobytes() != before.electrons.tobytes()
 
 
+@pytest.mark.keeps_light
 def test_what_is_kept_by_default_is_bounded(tmp_path):
     """Of lights of a fifth of the bound five are kept; of one beyond it none is."""
     shared = RECENT.shared_with(camera(tmp_path, BASE)).rate_cache
