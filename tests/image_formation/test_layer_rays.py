@@ -8,7 +8,7 @@ from layered_reference import FOCAL, PITCH, Flat, Scene, changes, random_scene, 
 from making import QUIET, camera, radiance_for
 
 from vcam_cli import simulate
-from vcam_cli.image_formation.layers import ray_windows
+from vcam_cli.image_formation.layers import layered, ray_windows
 from vcam_cli.image_formation.layers.occlusion import RayLayer, covariance, rays
 from vcam_cli.image_formation.layers.ray_cells import Window
 from vcam_cli.image_formation.layers.ray_windows import _Sum, _too_coarse, windows_with
@@ -261,3 +261,20 @@ def test_what_moving_layers_hide_is_the_mean_over_instants(tmp_path):
         total = total + simulate(camera(tmp_path, given)).frame.mean_electrons / instants
     error = np.sqrt(np.mean(np.square(moved.mean_electrons - total))) / total.max()
     assert error <= 0.002
+
+
+@pytest.mark.parametrize("f_number", [1000, 3000])
+def test_what_a_cut_margin_changes_is_predicted(f_number, tmp_path, monkeypatch):
+    """Behind such a lens light comes from hundreds of arrays around: against so wide a margin."""
+    found, predicted = [], []
+    for widest in (layered.WIDEST, 200):
+        monkeypatch.setattr(layered, "WIDEST", widest)
+        scene = random_scene(np.random.default_rng(3), 2)
+        size = {"array.rows": 12, "array.columns": 16, "optics.f_number": f_number}
+        given = {"scene.radiance": radiance_for(5000), "effects": QUIET, "accuracy": "reference"}
+        frame = simulate(camera(tmp_path, given | changes(scene, tmp_path) | size)).frame
+        found.append(frame.mean_electrons)
+        predicted.append(frame.spectrum.depth.error)
+    off = float(np.sqrt(np.square(found[0] - found[1]).mean())) / found[1].max()
+    assert 1e-3 < off <= predicted[0]
+    assert predicted[1] < 1e-3

@@ -96,6 +96,20 @@ def test_bars_within_a_cell_choose_the_light_that_is_seen():
     np.testing.assert_allclose(found[1], [[1 / 3, 1 / 2.5]], atol=1e-15)
 
 
+@pytest.mark.parametrize("at_once", [1, 50, 1 << 20])
+def test_masks_of_any_fineness_divide_cells_whatever_is_held_at_once(at_once, monkeypatch):
+    """Against sums over squares of which light, opacity and cells are all made."""
+    monkeypatch.setattr("vcam_cli.scenes.layered.MOST_PARTS", at_once)
+    rng, frame = np.random.default_rng(4), Frame(120.0, 60.0)
+    light, mask = rng.uniform(0, 1, (4, 3)), rng.uniform(0, 1, (30, 60))
+    both = light.repeat(15, 0).repeat(40, 1) * mask.repeat(2, 0).repeat(2, 1)
+    expected = np.pad(both, ((15, 15), (0, 0))).reshape(3, 30, 2, 60).mean(axis=(1, 3))
+    opacity = PictureChart(mask[:, :, None], frame, mirrored=False)
+    chart = MaskedChart(PictureChart(light[:, :, None], frame, mirrored=True), opacity)
+    edges = np.array([-60.0, 0.0, 60.0]), np.array([-45.0, -15.0, 15.0, 45.0])
+    np.testing.assert_allclose(chart.averages(*edges, np.eye(2))[0], expected, atol=1e-14)
+
+
 def covers(edges, cells):
     """The part of each cell that lies between each pair of edges: (cells, runs)."""
     low = np.maximum.outer(cells[:-1], edges[:-1])

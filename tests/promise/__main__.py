@@ -2,6 +2,7 @@
 
     python -m tests.promise [--named] [--random] [--exact] [--frames] [--matrix] [--times] [--spent]
                             [--count N] [--first-seed N] [CAMERA...]
+    python -m tests.promise --frames --kinds KIND... [--count N] [--first-seed N]
     python -m tests.promise --only KIND SEED
 
 Without options: all of it, in an hour on two processors. Named cameras have little in common;
@@ -48,12 +49,15 @@ def main() -> int:
     parser.add_argument("--json", help="also write what was found to this file")
     parser.add_argument("--count", type=int, default=frames.COUNT, help="random frames")
     parser.add_argument("--first-seed", type=int, default=0, help="of every kind of them")
+    parser.add_argument(
+        "--kinds", nargs="+", choices=tuple(frames.KINDS), default=(), help="of them; default all"
+    )
     parser.add_argument("--only", nargs=2, metavar=("KIND", "SEED"), help="print one of them")
     options = parser.parse_args()
     if options.only:
         print(frames.show(*options.only, Path(tempfile.mkdtemp())))
         return 0
-    drawn = frames.cases(options.count, options.first_seed)
+    drawn = frames.cases(options.count, options.first_seed, options.kinds)
     PARTS["frames"] = replace(PARTS["frames"], cases=drawn)
     limit_blas_threads()  # of the processes that are started, as `vcam` does
     names = [name for name in PARTS if getattr(options, name)] or list(PARTS)

@@ -1,6 +1,7 @@
 """Random frames of all kinds, each against a truth of its own: the kinds, and how many of each.
 
-    python -m tests.promise --frames [--count 3000] [--first-seed 0] [--only KIND SEED]
+    python -m tests.promise --frames [--count 3000] [--first-seed 0] [--kinds KIND...]
+    python -m tests.promise --only KIND SEED
 
 KINDS is the table: what a kind is, its share, the function that draws it. Scenes are drawn in
 frame_scenes.py, cameras in frame_cameras.py, layers in frame_layers.py; truths are computed in
@@ -184,13 +185,18 @@ KINDS = {
 }
 
 
-def cases(count: int, first: int) -> tuple[tuple[str, str | int], ...]:
-    """Kinds and names or seeds of so many random frames, from a seed on; named cases first."""
+def cases(count: int, first: int, kinds: Sequence[str] = ()) -> tuple[tuple[str, str | int], ...]:
+    """Kinds and names or seeds of so many random frames, from a seed on; named cases first.
+
+    kinds: those that are drawn, without named cases; () for all.
+    """
     named = [("named", name) for name in (*frame_named.CASES, *frame_named.TIGHT_CASES)]
-    shares = sum(kind.share for kind in KINDS.values())
+    named = [] if kinds else named
+    some = {name: KINDS[name] for name in kinds or KINDS}
+    shares = sum(kind.share for kind in some.values())
     drawn = [
         (number / (kind.share * count), name, first + number)
-        for name, kind in KINDS.items()
+        for name, kind in some.items()
         for number in range(round(kind.share / shares * count))
     ]
     return (*named, *((name, seed) for _, name, seed in sorted(drawn)))

@@ -53,6 +53,24 @@ def test_the_power_of_a_wave_is_half_its_squared_amplitude():
     assert at == pytest.approx(1 / 256e-6, rel=2e-2)
 
 
+@pytest.mark.parametrize("period", [2, 3])
+def test_detail_finer_than_pixels_is_what_their_means_have(period):
+    """A lattice before photodetectors of 6.9 samples, which lie anywhere on it: brute force.
+
+    Samples count as if all of their light was in their middle: a fifth more.
+    """
+    row = (np.arange(258) % period == 0).astype(float)
+    width = 6.9
+    sums = np.concatenate([[0], row.cumsum()])
+    at = np.random.default_rng(0).uniform(0, 250, 5000)
+    place = np.arange(len(sums))
+    means = (np.interp(at + width, place, sums) - np.interp(at, place, sums)) / width
+    detail = picture_detail(
+        row * np.ones((258, 1)), PITCH, (width * PITCH, width * PITCH), passes, 1.0
+    )
+    assert means.std() <= detail.rms(np.ones_like(detail.frequency)) <= 1.25 * means.std()
+
+
 def test_shares_of_a_sample_add_up_and_have_its_radius():
     radius = np.linspace(30e-6, -10e-6, 48)[:, None] + np.zeros((48, 48))
     found = cut(radius)

@@ -94,8 +94,6 @@ def picture_detail(
     Detail
         The detail.
     """
-    together = max(int(min(aperture) / pitch) // 2, 1)  # finer than these nothing is seen
-    picture, pitch = block_means(picture, together), pitch * together
     squares = np.square(scipy.fft.dctn(picture.astype(np.float32), type=2, norm="ortho"))
     squares[0, 0] = 0
     fy, fx = (np.arange(count) / (2 * count * pitch) for count in picture.shape)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.parallel import pieces
 from vcam_cli.scenes.base import Chart, ChartScene, Frame, Scene, View
 from vcam_cli.scenes.cells import means_of_parts
 from vcam_cli.scenes.depth_scene import DepthScene
@@ -26,9 +27,8 @@ the other. How fine cells within pixels are to be is chosen by what they err, wi
 MOST_BORDERS = 16
 """Borders of samples in a cell that divide it, at most, in the mean: then their light and opacity
 vary together by a sixteenth of what they are, of one in so many squared samples."""
-MOST_PARTS = 8192
-"""Parts along an axis, at most, that samples of opacity divide: beyond, in margins as wide as many
-arrays, light and opacity are averaged apart."""
+MOST_PARTS = 1 << 20
+"""Parts of cells, about, that are held at once."""
 SAME = 1e-6
 """Part of a cell below which two places are one."""
 
@@ -52,15 +52,23 @@ class MaskedChart(Chart):
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
         """Write the averages over the cells: exact, since samples of opacity divide them."""
         out[:] = 0
-        columns, rows = self.opacity.cells(x_edges, y_edges)
-        if columns.stop > columns.start and rows.stop > rows.start:
-            edges = _edges(x_edges, columns), _edges(y_edges, rows)
-            borders = self.opacity.sample_borders(*edges)
-            x, y = (_with_borders(*both) for both in zip(edges, borders, strict=True))
-            seen = self.light.averages(x, y, mix[:, :-1])
+        (columns, across, x_inside), (rows, down, y_inside) = self.opacity.inside(x_edges, y_edges)
+        if not len(across) or not len(down):
+            return
+        borders = self.opacity.sample_borders(x_inside, y_inside)
+        x, y = (_with_borders(*both) for both in zip((x_inside, y_inside), borders, strict=True))
+        middle, first = (x[1:] + x[:-1]) / 2, np.searchsorted(y, y_inside)
+        few = max(1, len(down) * MOST_PARTS // ((len(x) - 1) * (len(y) - 1)))
+        for some in pieces(len(down), few):
+            here = y[first[some.start] : first[some.stop] + 1]
+            seen = self.light.averages(x, here, mix[:, :-1])
             seen += mix[:, -1, None, None]
-            seen *= self.opacity.averages(x, y, np.ones((1, 1), mix.dtype))
-            out[:, rows, columns] = means_of_parts(seen, (y, x), edges[::-1])
+            seen *= self.opacity.values(
+                middle, (here[1:] + here[:-1]) / 2, np.ones((1, 1), mix.dtype)
+            )
+            found = means_of_parts(seen, (here, x), (_edges(y_inside, some), x_inside))
+            found *= np.outer(down[some], across).astype(mix.dtype)
+            out[:, rows, columns][:, some] = found
 
     def sample_borders(self, x_edges: Array, y_edges: Array) -> tuple[Array, Array]:
         """Return where light or opacity may change within cells."""
@@ -89,9 +97,8 @@ class MaskedChart(Chart):
 
     def crop_to_cells(self, x_edges: Array, y_edges: Array) -> "MaskedChart":
         """Return the same with light that may be faster on these cells."""
-        columns, rows = self.opacity.cells(x_edges, y_edges)
-        if columns.stop > columns.start and rows.stop > rows.start:
-            x, y = _edges(x_edges, columns), _edges(y_edges, rows)
+        (_, across, x), (_, down, y) = self.opacity.inside(x_edges, y_edges)
+        if len(across) and len(down):
             return replace(self, light=self.light.crop_to_cells(x, y))
         return self
 
@@ -237,12 +244,8 @@ def _divided(edges: Array, borders: Array) -> Array:
 
 
 def _with_borders(parts: Array, borders: Array) -> Array:
-    """Return the edges of parts, and borders within them.
-
-    More borders than a few a part are left out: the parts average over them.
-    """
-    few = min(MOST_BORDERS * len(parts), MOST_PARTS)
-    if not len(borders) or len(borders) > few:
+    """Return the edges of parts, and borders within them."""
+    if not len(borders):
         return parts
     near = SAME * float(np.diff(parts).min())  # what differs by rounding is one place
     borders = np.unique(borders)

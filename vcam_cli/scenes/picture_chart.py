@@ -12,6 +12,9 @@ from vcam_cli.scenes.base import Chart, Frame
 from vcam_cli.scenes.cells import clip_cells
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, counted_height
 
+Inside = tuple[slice, Array, Array]
+"""Cells along an axis, the part of each that is inside a frame, and their edges in it [m]."""
+
 
 @dataclass(frozen=True, eq=False)
 class PictureChart(Chart):
@@ -99,8 +102,8 @@ class PictureChart(Chart):
         """Return the same chart of squared values."""
         return replace(self, picture=np.square(self.picture))
 
-    def cells(self, x_edges: Array, y_edges: Array) -> tuple[slice, slice]:
-        """Return the columns and rows of cells that the picture reaches.
+    def inside(self, x_edges: Array, y_edges: Array) -> tuple[Inside, Inside]:
+        """Return the cells that the picture reaches, and what of each is inside its frame.
 
         Parameters
         ----------
@@ -109,14 +112,15 @@ class PictureChart(Chart):
 
         Returns
         -------
-        tuple of slice
-            Columns and rows.
+        columns, rows : Inside
+            Those cells, the part of each that is inside, and their edges, cut to the frame [m].
         """
         if self.mirrored:
-            return slice(0, len(x_edges) - 1), slice(0, len(y_edges) - 1)
-        columns, _, _ = clip_cells(x_edges, self.frame.width / 2)
-        rows, _, _ = clip_cells(y_edges, self.frame.height / 2)
-        return columns, rows
+            x, y = ((slice(0, len(e) - 1), np.ones(len(e) - 1), e) for e in (x_edges, y_edges))
+        else:
+            x = clip_cells(x_edges, self.frame.width / 2)
+            y = clip_cells(y_edges, self.frame.height / 2)
+        return x, y
 
     def _shares(self, edges: Array, count: int) -> tuple[Any, slice]:
         """Return what of each cell is each sample's, a sparse matrix, and the samples that occur.

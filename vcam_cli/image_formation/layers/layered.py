@@ -31,7 +31,8 @@ from vcam_cli.effects.base import (
     SeparableTransfer,
     of_kind,
 )
-from vcam_cli.image_formation.estimates.bandwidth import MARGIN_SHARE, margin
+from vcam_cli.floats import rms
+from vcam_cli.image_formation.estimates.bandwidth import margin
 from vcam_cli.image_formation.layers.layer_edges import (
     even_motion,
     moves_otherwise,
@@ -64,7 +65,7 @@ PART = 0.5
 
 WIDEST = 4
 """Arrays that a layer's chart goes on beyond the array, at most. A lens at f/10000 throws light
-farther; what is cut is in the predicted error."""
+farther; what is cut is in the predicted error: what half of that margin changes."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,7 @@ class SeenLayer:
     """Pixels by which its chart goes on beyond the window."""
     report: SpectrumReport
     cut_rms: float
-    """What the cut margin of its chart lacks, rms [e/s]."""
+    """What a cut margin of its chart changes, rms [e/s]."""
 
     def lost_rms(self, g: Geometry) -> float:
         """Return a bound on what the layer's own image lacks, rms over all of an array [e/s]."""
@@ -149,10 +150,15 @@ def _layers_seen(path: OpticalPath, scene: LayeredScene, form: FormImage) -> Ite
         hides = part is not scene.parts[-1]
         seen = _layer_path(path, part, effects, scene.brightest, hides)
         if seen is not None:
-            window, own, beyond, cut_rms = seen
-            light, cover, report = _light_and_cover(
-                own, part, window.center(path.geometry), beyond, scene.white, form
-            )
+            window, own, beyond, is_cut = seen
+            center = window.center(path.geometry)
+            light, cover, report = _light_and_cover(own, part, center, beyond, scene.white, form)
+            cut_rms = 0.0
+            if is_cut:  # the tail of a line is halved by a margin twice as wide
+                half = _light_and_cover(own, part, center, beyond // 2, scene.white, form)
+                level = scene.brightest * path.transfer.level[-1, :, None, None]
+                changed = np.abs(light - half[0]) + level * np.abs(cover - half[1])
+                cut_rms = rms(changed)
             yield SeenLayer(number, window, light, cover, own, beyond, report, cut_rms)
 
 
@@ -225,12 +231,12 @@ def gathered(
 
 def _layer_path(
     path: OpticalPath, part: LayerPart, effects: tuple[Effect, ...], brightest: float, hides: bool
-) -> tuple[Window, OpticalPath, int, float] | None:
+) -> tuple[Window, OpticalPath, int, bool] | None:
     """Return where a layer is seen, and the path of its light; None where it is beside the array.
 
     Of a layer that hides others the path has twice the colors: those of the light, and of the
     opacity in light as bright as the scene's brightest, relative to white. The third value are the
-    pixels by which its chart is to go on beyond the window, the last one what it lacks [e/s].
+    pixels by which its chart is to go on beyond the window, the last one whether they are too few.
     """
     g = path.geometry
     # Opacity counts as the scene's brightest light, which may lie behind it; no light is cut.
@@ -240,9 +246,6 @@ def _layer_path(
     band = float(path.transfer.wavelengths[0]), float(path.transfer.wavelengths[-1])
     wanted = margin(g, effects, band, knobs)
     beyond = min(wanted, WIDEST * max(g.rows, g.columns))
-    # The tail of a line falls with its distance: what it has left at the wanted one is a share of
-    # the tolerance.
-    cut_rms = MARGIN_SHARE * tolerance * level * (wanted / beyond) if wanted > beyond else 0.0
     far = beyond * max(g.pitch_x, g.pitch_y)
     if of_kind(effects, FieldTransfer, ImageMotion):
         far = math.inf
@@ -271,7 +274,7 @@ def _layer_path(
         full=min(level, path.full),
         has_opacity=hides,
     )
-    return window, own, beyond, cut_rms
+    return window, own, beyond, wanted > beyond
 
 
 def _light_and_cover(
