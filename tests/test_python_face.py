@@ -49,14 +49,14 @@ def test_the_face_lists_itself():
 def test_with_is_what_set_is(name):
     """The same camera as from the command line, of every shipped file; the first stays."""
     before = load(name)
-    changes = {"name": "other", "exposure.time": "7 ms", "adc.bits": 9, "seed": {"frame": 5}}
+    changes = {"name": "other", "exposure.time": "7 ms", "adc.bits": 15, "seed": {"frame": 5}}
     changed = before.with_(changes)
-    sets = ["name=other", "exposure.time=7 ms", "adc.bits=9", "seed={frame: 5}"]
+    sets = ["name=other", "exposure.time=7 ms", "adc.bits=15", "seed={frame: 5}"]
     assert changed == load(name, sets)
     assert before == load(name)
     assert changed.files == before.files
     assert before.with_({}) == before
-    assert before.with_({"adc.bits": np.int64(9)}).adc.bits == 9
+    assert before.with_({"adc.bits": np.int64(15)}).adc.bits == 15
 
 
 def test_changes_add_up(tmp_path, monkeypatch):

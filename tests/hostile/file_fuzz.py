@@ -155,7 +155,7 @@ def _as_curve(path: Path) -> None:
 
 def _as_places(path: Path) -> None:
     read_positions.cache_clear()
-    read_positions(str(path), 0, ("R", "G", "B"))
+    read_positions(str(path), 0, ("R", "G", "B"), "center")
 
 
 def told(error: ValueError) -> BadInput:
