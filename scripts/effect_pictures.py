@@ -104,15 +104,15 @@ EXAMPLES = {
         "Red light is absorbed deep in the silicon; its charge wanders to the neighbors.",
     ),
     "distortion": Example(
-        (*_chart("eye-chart"), *GRAY, "optics.distortion={k1: -3}"),
-        "A lens with barrel distortion of 10 % in the corner.",
+        (*_chart("colorchecker"), "optics.distortion={k1: -4.5}"),
+        "A lens with barrel distortion of 16 % in the corner.",
     ),
     "lateral_color": Example(
         (
-            *_chart("siemens-star"),
-            "optics.lateral_color={table: {450: -1 %, 550: 0 %, 650: 1 %}}",
+            *_chart("eye-chart"),
+            "optics.lateral_color={table: {450: -2.5 %, 550: 0 %, 650: 2.5 %}}",
         ),
-        "Blue is imaged 1 % smaller than green, red 1 % larger: edges have colored rims.",
+        "Blue is imaged 2.5 % smaller than green, red 2.5 % larger: letters have colored rims.",
     ),
     "off_axis": Example(
         (*WALL, "optics.focal_length=0.4 mm", "exposure.time=3 ms"),
