@@ -18,7 +18,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
 
 from vcam_cli.processing.base import Block, mirrored_index
 
@@ -122,6 +121,8 @@ def denoised(planes: Planes, deviation: np.ndarray) -> Planes:
     ndarray
         Planes of the same shape.
     """
+    from scipy import ndimage
+
     out = np.empty_like(planes)
     for plane, sigma, result in zip(planes, deviation, out, strict=True):
         wide = plane.astype(np.float64)
@@ -149,6 +150,8 @@ def sharpened(planes: Planes, radius: float, amount: float) -> Planes:
     ndarray
         Planes of the same shape.
     """
+    from scipy import ndimage
+
     blurred = ndimage.gaussian_filter(
         planes, (0, radius, radius), radius=(0, *[blur_reach(radius)] * 2)
     )
