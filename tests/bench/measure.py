@@ -18,6 +18,7 @@ from vcam_cli import simulate
 from vcam_cli.camera.camera import Camera
 from vcam_cli.parallel import available_workers
 from vcam_cli.progress import Silent
+from vcam_cli.simulation.shared import Shared
 
 NOISE_SOURCES = 5
 """Noise sources in the yardstick."""
@@ -88,7 +89,8 @@ def start_cost(work: Sequence[str], folder: str) -> Cost:
     kept = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
     kept["PYTHONPYCACHEPREFIX"] = f"{folder}/compiled"
     command = [sys.executable, *work]
-    return run_cost(lambda: subprocess.run(command, env=kept, check=True), children_clocks)
+    silent = {"env": kept, "check": True, "stdout": subprocess.DEVNULL}
+    return run_cost(lambda: subprocess.run(command, **silent), children_clocks)
 
 
 def take_turns(repeats: int, *works: Callable[[], Cost]) -> list[Cost]:
@@ -204,7 +206,7 @@ class Frames:
         reading, results = _Reading(), []
 
         def work() -> None:
-            results.append(simulate(self.camera, watch=reading))
+            results.append(simulate(self.camera, watch=reading, shared=Shared()))
             results[0].render  # noqa: B018
 
         whole = run_cost(work)

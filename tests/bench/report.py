@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-FORMATS = {"wall": "9.3f", "cpu": "9.3f", "share": "9.2%", "gigabytes": "9.2f"}
+FORMATS = {"wall": "9.3f", "cpu": "9.3f", "before": "9.3f", "share": "9.2%", "gigabytes": "9.2f"}
 """The columns that a row may have, and how their figures are written."""
 WIDTH = 46
 """Characters before the first column."""
@@ -16,7 +16,7 @@ def lines(found: dict[str, Any]) -> Iterator[str]:
     unit, rows, columns = found["r_compute"], *found["size"]
     yield f"{rows} x {columns} pixels, {found['processors']} processors"
     yield f"R_compute = 1 ({unit['wall']:.3g} s here, {unit['cpu']:.3g} s of processors)"
-    yield f"{'':<{WIDTH}}{'wall':>9}{'cpu':>9}"
+    yield f"{'':<{WIDTH}}{'wall':>9}{'cpu':>9}{'before':>9}"
     for title, section in found["sections"].items():
         yield title
         for name, row in section.items():

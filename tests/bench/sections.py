@@ -23,6 +23,7 @@ from vcam_cli.errors import CannotDo
 from vcam_cli.floats import rms
 from vcam_cli.scheduling.pdf import Pdf
 from vcam_cli.scheduling.shot_noise import optimal_schedules
+from vcam_cli.simulation.shared import Shared
 
 from . import plain
 from .cameras import BUSY, LAYERED, PLAIN, Studio, studio
@@ -264,7 +265,7 @@ def sweeps(
     tree = place.tree("gray", PLAIN, **quality)
     path = place.write(tree, "swept.yaml")
     camera = load(path)
-    single = median_cost(lambda: simulate(camera).metrics, repeats)
+    single = median_cost(lambda: simulate(camera, shared=Shared()).metrics, repeats)
     rows = {}
     for name in varied or VARIED:
         key, start, stop = VARIED[name]

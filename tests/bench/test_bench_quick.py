@@ -6,7 +6,7 @@ import subprocess
 
 import numpy as np
 import pytest
-from bench import plain, sections
+from bench import plain, repeated, sections
 from bench.__main__ import main
 from bench.cameras import BUSY, PLAIN, studio
 from bench.measure import Cost, Frames, Yardstick, median, peak_memory, start_cost, take_turns
@@ -24,6 +24,7 @@ TINY = Size(
     plain_scenes=("color",),
     wavelengths=31,
     points=20,
+    repeated=(2, 4),
     levels=64,
     effects=("shot_noise", "off_axis"),
     scenes=(),
@@ -41,6 +42,7 @@ def found():
         # Those start processes, which takes longer than all the rest.
         patch.setattr(sections, "_swept", lambda study, out, points: 1.0)
         patch.setattr(sections, "start_cost", lambda work, folder: Cost(len(work), len(work)))
+        patch.setattr(repeated, "start_cost", lambda work, folder: Cost(len(work), len(work)))
         patch.setattr(sections, "peak_memory", lambda camera: 1_000_000_000)
         yield measure(TINY)
 

@@ -14,6 +14,7 @@ from vcam_cli.parallel import available_workers
 from . import sections
 from .cameras import BUSY, Studio, studio
 from .measure import Cost, Yardstick, yardstick
+from .repeated import repeated
 from .sections import Section
 
 PIXELS = 12e6
@@ -36,6 +37,8 @@ class Size:
     wavelengths: int = 31
     points: int = 20
     levels: int = 65_536
+    repeated: tuple[int, int] = (12, 200)
+    """Frames of a loop, and points of a sweep of small frames."""
     effects: tuple[str, ...] = ()
     """Some of the effects; () for all."""
     varied: tuple[str, ...] = ()
@@ -153,6 +156,10 @@ def _command(bench: Bench) -> dict[str, Section]:
     return sections.command(bench.size.repeats)
 
 
+def _repeated(bench: Bench) -> dict[str, Section]:
+    return repeated(bench.size.few, *bench.size.repeated)
+
+
 PARTS: dict[str, Callable[[Bench], dict[str, Section]]] = {
     "frames": _frames,
     "shipped": _shipped,
@@ -165,6 +172,7 @@ PARTS: dict[str, Callable[[Bench], dict[str, Section]]] = {
     "growth": _growth,
     "schedules": _schedules,
     "command": _command,
+    "repeated": _repeated,
 }
 
 

@@ -53,6 +53,11 @@ class ByteCache(Generic[T]):
                 self._kept.popitem(last=False)
         return value
 
+    def clear(self) -> None:
+        """Keep nothing."""
+        with self._lock:
+            self._kept.clear()
+
     @property
     def nbytes(self) -> int:
         """Memory that the results take [bytes]."""

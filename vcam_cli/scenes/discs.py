@@ -109,6 +109,11 @@ def paint(
     _COVERAGE.get((digest.digest(), str(hidden), divided), make).paint(color, out)
 
 
+def forget() -> None:
+    """Keep no coverage of what was painted."""
+    _COVERAGE.clear()
+
+
 def coverage(
     discs: Discs, x_edges: Array, y_edges: Array, hidden: Cells | None, divided: int
 ) -> Coverage:

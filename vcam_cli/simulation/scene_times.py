@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.simulation.plan import Decision
+from vcam_cli.simulation.shared import Shared
 from vcam_cli.simulation.simulate import Result, simulate
 
 TURNS = 5
@@ -63,7 +64,7 @@ def compute_frame(camera: Camera, workers: int) -> Result:
     CannotDo
         Where memory does not suffice.
     """
-    result = simulate(camera, workers)
+    result = simulate(camera, workers, shared=Shared())
     if camera.output.render:
         _ = result.render
     _ = result.metrics
