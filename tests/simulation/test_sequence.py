@@ -11,6 +11,8 @@ from vcam_cli import simulate
 from vcam_cli.commands.main import app
 from vcam_cli.errors import BadInput
 from vcam_cli.files.images.images import read_picture
+from vcam_cli.progress import Silent
+from vcam_cli.simulation import sequence
 from vcam_cli.simulation.sequence import frame_cameras
 
 WAVE = {"kind": "chart", "chart": "sinusoid", "frequency": "20 lp/mm"}
@@ -73,6 +75,30 @@ def test_a_lamp_flickers_on(tmp_path):
     middle = 2 * np.pi * 100 * (np.arange(5) / 30 + 1e-3)
     light = 1 + 0.4 * np.sinc(100 * 2e-3) * np.cos(middle)
     np.testing.assert_allclose(frames / np.mean(frames), light / light.mean(), rtol=1e-9)
+
+
+@pytest.mark.parametrize(("speed", "lights"), [("0 m/s", 1), ("0.05 m/s", 6)])
+def test_memory_stays_and_still_scenes_have_one_light(speed, lights, tmp_path, monkeypatch):
+    """Frames of 12 kB, of which 30 kB are kept: two, however many follow each other."""
+    kept, found, true = [], [], sequence.simulate
+
+    def watched(each, workers, watch, shared):
+        result = true(each, workers, watch, shared)
+        kept.append(shared.rate_cache.nbytes)
+        found.append(id(result.frame.rate))
+        lasting.append(result)
+        return result
+
+    lasting = []  # so that no two have one place in memory
+    monkeypatch.setattr(sequence, "simulate", watched)
+    source = WAVE | {"motion": {"x": speed}}
+    made = camera(tmp_path, {"scene.source": source, "effects": QUIET})
+    size = simulate(made).frame.rate.nbytes
+    monkeypatch.setattr(sequence, "LIGHT", 2 * size + size // 2)
+    for _ in sequence.frames(made, 6, 40, 1, Silent()):
+        pass
+    assert len(set(found)) == lights
+    assert kept == [size * min(n, lights, 2) for n in range(1, 7)]
 
 
 def test_exposures_have_to_fit(tmp_path):

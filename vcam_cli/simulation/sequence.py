@@ -22,6 +22,7 @@ from vcam_cli.files.folder import OutputFolder
 from vcam_cli.files.images.png import write_png
 from vcam_cli.files.images.video import VideoWriter, ffmpeg
 from vcam_cli.files.tables import write_table
+from vcam_cli.image_formation.rate_cache import RateCache
 from vcam_cli.progress import Observer
 from vcam_cli.simulation import exposure_control
 from vcam_cli.simulation.output import outputs
@@ -35,6 +36,9 @@ NO_VIDEO = (
     "no sequence.mp4 is written, since there is no ffmpeg on the PATH; frames/render_*.png and"
     " strip.png show the sequence"
 )
+LIGHT = 1 << 24
+"""Bytes of light that are kept, the last always: nothing that moves is seen again in the light of
+an earlier frame, and what stands still has one light."""
 STRIP = 8
 """Frames of a strip, at most."""
 STRIP_WIDTH = 240
@@ -101,7 +105,8 @@ def frames(
     watch : Observer
         Observer of stages.
     """
-    shared, settings, reference = Shared(), None, camera.exposure.reference
+    settings, reference = None, camera.exposure.reference
+    shared = Shared(RateCache(LIGHT))
     solved = solve(camera)
     for each in frame_cameras(camera, count, rate):
         if settings is not None:
