@@ -81,6 +81,10 @@ EXAMPLES = {
         (*_chart("eye-chart"), *GRAY, "scene.camera_motion={pan: 60 deg/s}", "exposure.time=5 ms"),
         "A camera that is turned by 0.3 degrees while it exposes.",
     ),
+    "jitter": Example(
+        (*_chart("siemens-star"), *GRAY, "scene.camera_motion={jitter: 1 px}"),
+        "Pointing that jitters by a pixel rms.",
+    ),
     "pixel_aperture": Example(
         (
             *_chart("siemens-star"),

@@ -82,6 +82,11 @@ CASES: dict[str, Case] = {
         {"optics.lateral_color": "none"},
         {"scene.source": WAVE},
     ),
+    "jitter": Case(
+        {"scene.camera_motion": {"jitter": "0.5 px"}},
+        {"scene.camera_motion": {"jitter": "0 px"}},
+        {"scene.source": WAVE},
+    ),
     "pixel_aperture": Case({}, None, {"scene.source": WAVE}),
     "charge_diffusion": Case(
         {

@@ -262,7 +262,7 @@ array: {rows: 60, columns: 80, pattern: bayer-rggb}
 exposure: {auto: {max: 100 ms}}
 """,
     "crosstalk": """
-scene: {source: {kind: chart, chart: colorchecker}}
+scene: {source: {kind: chart, chart: colorchecker}, camera_motion: {jitter: 0.2 px}}
 pixel:
   readout: {read_noise: 3 e}
   crosstalk:

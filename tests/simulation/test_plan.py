@@ -83,6 +83,7 @@ CAMERAS = {
         "optics.distortion": {"k1": -0.5},
         "optics.lateral_color": {"table": {450: "-0.5 %", 650: "0.5 %"}},
         "optics.stray_light": 0.03,
+        "scene.camera_motion": {"jitter": "0.3 px"},
         "pixel.architecture": "ccd",
         "pixel.readout.charge_transfer": {"inefficiency": 2e-4},
         "pixel.readout.row_noise": "3 e",

@@ -83,6 +83,7 @@ KEYS: Mapping[str, str] = {
     "cti": "pixel.readout.charge_transfer: {inefficiency: 3e-5, phases: 3}",
     **dict.fromkeys(("crosstalk", "optical_crosstalk"), "pixel.crosstalk: {optical: 1 %}"),
     **dict.fromkeys(("pdaf", "dual_pixel"), "pixel.phase_detection: dual"),
+    **dict.fromkeys(("jitter", "pointing_jitter"), "scene.camera_motion: {jitter: 0.5 px}"),
     "electrical_crosstalk": "pixel.crosstalk: {electrical: 0.5 %}",
     **dict.fromkeys(
         ("ipc", "interpixel_capacitance"), "pixel.crosstalk: {interpixel_capacitance: 0.5 %}"

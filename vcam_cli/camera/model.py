@@ -184,13 +184,12 @@ class CameraModel(FileModel):
                 message = "there are no pixels that see one half of the lens"
                 yield fault(("output", "phase"), message, "add pixel.phase_detection: dual")
             return
-        binned = array.binning is not None and array.binning.count > 1
         scattered = array.is_scattered or array.pattern == "stacked"
         several = bool(readout.gains) or readout.small is not None
         for refused, what, remedy in (
             (not self.optics.is_lens, "a bare sensor", "describe a lens in optics"),
             (scattered, "stacked or scattered pixels", "write another array.pattern"),
-            (binned, "binned pixels", "remove array.binning"),
+            (array.reads_several, "binned pixels", "remove array.binning"),
             (self.exposure.captures, "captures", "give one exposure time"),
             (several, "several readouts", "remove readout.gains and readout.small"),
         ):

@@ -16,6 +16,7 @@ from vcam_cli.camera.processing_steps import (
     Jpeg,
     LensDistortion,
     Matrix,
+    Remosaic,
     Sharpen,
     Step,
     Tone,
@@ -34,6 +35,7 @@ SHOWN = (0, 1, 3)
 Steps = tuple[Step, ...]
 _ANY = (
     BlackLevel
+    | Remosaic
     | Demosaic
     | WhiteBalance
     | ColorCorrection
@@ -67,6 +69,8 @@ def _example(given: Any) -> str:
 def _step(given: Any) -> Step:
     if isinstance(given, Step):
         return given
+    if given == "remosaic":  # there is one mosaic that it makes
+        return Remosaic(remosaic="bayer-rggb")
     if not isinstance(given, Mapping) or len(given) != 1:
         raise ValueError(
             f"{describe(given)} is not a step; write one key, such as demosaic: bilinear"
@@ -162,6 +166,10 @@ def picture_mistakes(
 ) -> Iterator[InitErrorDetails]:
     """Yield why these steps leave no picture that can be judged, or shown as a render."""
     done = [step.name for step in steps if step.value != "none"]
+    if "remosaic" in done and (array.pattern != "quad-bayer" or array.reads_several):
+        message = "remosaic makes a Bayer mosaic of a quad-bayer one whose pixels are read singly"
+        remedy = "remove it, or write array: {pattern: quad-bayer, binning: none}"
+        yield fault(("processing", done.index("remosaic"), "remosaic"), message, remedy)
     if array.mosaic and "demosaic" not in done:
         add = "add demosaic: bilinear to processing, or write"
         if judged:
@@ -238,6 +246,8 @@ def _reasons(
     late = [step for step in ("white_balance", "color_correction") if step in before]
     if name == "black_level" and late:
         yield f"black_level after {late[0]}: gains need black at zero", "put black_level first"
+    if name == "remosaic" and "demosaic" in before:
+        yield "remosaic after demosaic: every pixel has all its colors", "put remosaic first"
     if name == "demosaic" and not mosaic:
         yield "every pixel of this array has all its colors", "remove this step"
     if name in OF_COLORS and colors == 1:

@@ -58,6 +58,14 @@ class Demosaic(Step):
     )
 
 
+class Remosaic(Step):
+    """From a quad-Bayer mosaic to a Bayer mosaic; it stands before demosaic."""
+
+    remosaic: Literal["bayer-rggb"] = key(
+        "the mosaic that is made of a quad-bayer one, of as many pixels", example="bayer-rggb"
+    )
+
+
 class WhiteBalance(Step):
     """A gain for each color. It may stand before demosaic or after it."""
 

@@ -20,6 +20,7 @@ EFFECTS = {
     "lateral_color": "a lens that magnifies by wavelength",
     "stray_light": "light spread evenly over the sensor",
     "motion": "blur and skew by motion of scene or camera",
+    "jitter": "blur by fast random pointing",
     "pixel_aperture": "blur by the photodetector's area",
     "charge_diffusion": "blur by charge that diffuses in the silicon",
     "pixel_vignetting": "shading by the layers above the photodetector",

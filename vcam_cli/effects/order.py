@@ -7,6 +7,7 @@
     radiance of the scene  StillWarp          distortion, lateral_color      the same, elsewhere
     spectrum of the image  Blur               diffraction, aberration,       electrons / s, blurred
                                               depth
+    spectrum of the image  Blur               jitter                         electrons / s, blurred
     spectrum of the image  SeparableTransfer  pixel_aperture                 electrons / s, blurred
     spectrum of the image  Blur               charge_diffusion               electrons / s, blurred
     electrons / s          Gain               off_axis                       electrons / s
@@ -59,6 +60,7 @@ from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
 from vcam_cli.effects.pixel.pixel_vignetting import PixelVignetting
 from vcam_cli.effects.pixel.saturation import Saturation
 from vcam_cli.effects.temporal.flicker import Flicker
+from vcam_cli.effects.temporal.jitter import Jitter
 from vcam_cli.effects.temporal.motion import Motion
 
 ORDER: tuple[type[Effect], ...] = (
@@ -68,6 +70,7 @@ ORDER: tuple[type[Effect], ...] = (
     Diffraction,
     Aberration,
     Depth,
+    Jitter,
     PixelAperture,
     ChargeDiffusion,
     OffAxis,

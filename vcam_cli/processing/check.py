@@ -12,6 +12,7 @@ from vcam_cli.processing.base import Pattern
 
 CHOICES: dict[str, tuple[str, ...]] = {
     "black_level": ("subtract", "none"),
+    "remosaic": ("bayer-rggb",),
     "demosaic": ("bilinear", "edge-aware"),
     "white_balance": ("gray-world", "bright-block", "illuminant", "none"),
     "color_correction": ("fit", "primaries", "none"),

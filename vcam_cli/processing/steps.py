@@ -29,6 +29,7 @@ from vcam_cli.processing import (
     jpeg,
     lens_distortion,
     picture_steps,
+    remosaic,
     scattered_pixels,
     white_balance,
 )
@@ -137,6 +138,23 @@ def _black_level(draft: Draft, step: Step, path: Path) -> Draft:
     return draft.with_operations(black_level.BlackLevel(level, block, tuple(steps.values())))
 
 
+def _remosaic(draft: Draft, step: Step, path: Path) -> Draft:
+    context, shape = draft.context, draft.dn.shape
+    if context.pattern != remosaic.QUAD:
+        raise bad(path, "this is no quad-bayer mosaic", "remove this step")
+    guided = GuidedInterpolation(
+        context.pattern, context.colors, _white_above_black(draft), Sites(context.pattern, shape)
+    )
+    made = draft.with_operations(remosaic.Remosaic(guided, context.colors, shape[0]))
+    return replace(made, context=replace(context, pattern=remosaic.BAYER))
+
+
+def _white_above_black(draft: Draft) -> tuple[float, ...]:
+    """Return perfect white in each color, less black, as the steps so far leave them."""
+    white = draft.apply_to_colors(draft.context.white_dn)
+    return tuple((white - draft.apply_to_colors(_black_signal(draft))).tolist())
+
+
 def _demosaic(draft: Draft, step: Step, path: Path) -> Draft:
     context, shape = draft.context, draft.dn.shape
     if context.layout is not None:
@@ -152,12 +170,7 @@ def _demosaic(draft: Draft, step: Step, path: Path) -> Draft:
         )
     method: Operation
     if edges:
-        white = tuple(
-            (
-                draft.apply_to_colors(context.white_dn)
-                - draft.apply_to_colors(_black_signal(draft))
-            ).tolist()
-        )
+        white = _white_above_black(draft)
         aware = EdgeAware(pattern, colors, white)
         method = (
             aware if bayer else GuidedInterpolation(pattern, colors, white, Sites(pattern, shape))
@@ -317,6 +330,7 @@ def _tone(draft: Draft, step: Step, path: Path) -> Draft:
 
 STEPS: dict[str, Apply] = {
     "black_level": _black_level,
+    "remosaic": _remosaic,
     "demosaic": _demosaic,
     "white_balance": _white_balance,
     "color_correction": _color_correction,

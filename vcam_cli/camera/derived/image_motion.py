@@ -213,6 +213,9 @@ def trajectory(camera: Camera, geometry: Geometry, reference: float = 0.0) -> Tr
 
 def check_motion(camera: Camera) -> None:
     """Refuse motion whose image is not known (BadInput)."""
+    turn = camera.scene.camera_motion
+    if turn is not None and turn.jitter and not camera.optics.is_lens:
+        raise bad((*CAMERA, "jitter"), "a bare sensor forms no image that could move", "remove it")
     if not camera.scene.moves:
         return
     motion = camera.scene.source.motion

@@ -51,6 +51,11 @@ class CameraMotion(Model):
     roll: TurningSpeed = key(
         "about the optical axis, clockwise for the photographer", example="5 deg/s", default=0.0
     )
+    jitter: Annotated[float, Quantity("pixels", least=0, most=1000)] = key(
+        "fast random pointing, rms along each axis: a blur, the same in every frame",
+        example="0.5 px",
+        default=0.0,
+    )
     file: Annotated[str | None, FileName()] = key(
         "angles or rates over time in place of constant speeds: a CSV file with a column of time"
         " (time_s, timestamp [ns]) and some of pan, tilt, roll (pan_deg) or gyro_x, gyro_y, gyro_z"
@@ -69,5 +74,5 @@ class CameraMotion(Model):
 
     @property
     def moves(self) -> bool:
-        """Whether it is any motion, as far as that is known without its file."""
+        """Whether it turns over time, as far as that is known without its file."""
         return bool(self.pan or self.tilt or self.roll or self.file)

@@ -221,6 +221,11 @@ class Array(Model):
         return self.pattern == "honeycomb" or isinstance(self.pattern, Positions)
 
     @property
+    def reads_several(self) -> bool:
+        """Whether several pixels are read as one."""
+        return self.binning is not None and self.binning.count > 1
+
+    @property
     def summed_charges(self) -> int:
         """Pixels whose charge is counted as one."""
         given = self.binning
