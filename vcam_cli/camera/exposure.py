@@ -35,6 +35,11 @@ class AutoExposure(Model):
         "largest gain, where the longest time is not enough; the gain itself by default",
         default=1.0,
     )
+    max_iso: MaybePositive = key(
+        "largest ISO speed (12232, saturation-based), in place of max_gain",
+        example=3200,
+        default=None,
+    )
     method: Literal["white", "percentile", "mean"] = key(
         "the level: the perfect white's, a percentile of the picture, or its mean", default="white"
     )
@@ -49,6 +54,8 @@ class AutoExposure(Model):
         " before would have needed; 1: all of it",
         default=0.5,
     )
+
+    rules = (at_most_one("max_gain", "max_iso"),)
 
     @model_validator(mode="after")
     def _check_order(self) -> Self:

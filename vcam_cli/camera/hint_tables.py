@@ -84,6 +84,9 @@ KEYS: Mapping[str, str] = {
     **dict.fromkeys(("crosstalk", "optical_crosstalk"), "pixel.crosstalk: {optical: 1 %}"),
     **dict.fromkeys(("pdaf", "dual_pixel"), "pixel.phase_detection: dual"),
     **dict.fromkeys(("jitter", "pointing_jitter"), "scene.camera_motion: {jitter: 0.5 px}"),
+    **dict.fromkeys(("max_iso", "iso_limit"), "exposure.auto: {max: 100 ms, max_iso: 3200}"),
+    **dict.fromkeys(("bad_columns", "column_defects"), "pixel.defects: {columns: 0.001}"),
+    **dict.fromkeys(("bad_rows", "row_defects"), "pixel.defects: {rows: 0.001}"),
     "electrical_crosstalk": "pixel.crosstalk: {electrical: 0.5 %}",
     **dict.fromkeys(
         ("ipc", "interpixel_capacitance"), "pixel.crosstalk: {interpixel_capacitance: 0.5 %}"

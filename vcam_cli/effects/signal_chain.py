@@ -68,6 +68,22 @@ class Site:
             self.lines_drawn[name] = drawn
         return self.lines_drawn[name]
 
+    def uniform_columns(self, name: str) -> Array:
+        """Return one number of 0 to 1 a column, the same for every block and float type."""
+        if name not in self.lines_drawn:
+            drawn = self.line_stream(name).random(self.columns)
+            drawn.setflags(write=False)
+            self.lines_drawn[name] = drawn
+        return self.lines_drawn[name]
+
+    def uniform_rows(self, name: str) -> Array:
+        """Return one number of 0 to 1 a row (rows, 1), the same for every float type."""
+        if name not in self.lines_drawn:
+            drawn = self.line_stream(name).random(self.all_rows)
+            drawn.setflags(write=False)
+            self.lines_drawn[name] = drawn
+        return self.lines_drawn[name][self.first_row : self.first_row + self.rows, None]
+
     def normal_rows(self, name: str) -> Array:
         """Return one standard normal number a row, the same for every column, (rows, 1)."""
         return self.stream(name).standard_normal((self.rows, 1), dtype=self.dtype)

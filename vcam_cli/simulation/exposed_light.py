@@ -96,7 +96,7 @@ def expose(seen: SceneLight, light: photon_rate.Rate) -> ExposedLight:
     made = layout.select_pixels(light.values)
     collected = made if sharing is None else sharing.arriving(made)
     rate = groups.collect(_transported(collected, pixel_dark, effects))
-    asked = solved.exposure
+    asked = solved.limited_exposure
     times = sample_times.choose_sample_times(asked, rate, solved.chain)
     chosen = auto_exposure.exposure_settings(asked, rate, white, dark, solved.chain.metered)
     if times:

@@ -44,7 +44,7 @@ def next_exposure(camera: Solved, last: Prepared) -> ExposureSettings:
     metered = np.minimum(last.rate, max(full / time - last.dark_rate, 0.0))
     white = float(last.white_rate.max())
     wanted = auto_exposure.exposure_settings(
-        camera.exposure, metered, white, last.dark_rate, circuit
+        camera.limited_exposure, metered, white, last.dark_rate, circuit
     )
     now = time * gain
     product = now * (wanted.time * wanted.gain / now) ** auto.follow

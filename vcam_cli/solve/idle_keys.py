@@ -116,6 +116,11 @@ RULES = (
     ),
     FOLLOW,
     Rule(
+        ("pixel.defects.hot_current",),
+        lambda camera: not camera.pixel.defects.hot,
+        "there are no hot pixels; add hot: 1e-4",
+    ),
+    Rule(
         ("optics.defocus",),
         lambda camera: camera.optics.focus == "auto",
         "the autofocus takes it out; write focus: fixed",

@@ -81,6 +81,42 @@ def electrons_per_exposure(
     return np.asarray(levels[0] / lux if lux > 0 else np.zeros(len(levels[0])))
 
 
+def limited(exposure: Exposure, base_iso: float, least: float) -> Exposure:
+    """Return an exposure whose largest gain follows from its largest ISO speed.
+
+    Parameters
+    ----------
+    exposure : Exposure
+        What the file says of the exposure.
+    base_iso : float
+        ISO speed of the camera at gain 1; 0 of one that sees nothing of daylight.
+    least : float
+        Gain from which an automatic exposure starts.
+
+    Returns
+    -------
+    Exposure
+        The same, `auto.max_gain` = `auto.max_iso` / base_iso, where the file gives `max_iso`.
+
+    Raises
+    ------
+    BadInput
+        For a camera that sees nothing of daylight, or whose gain is beyond `max_iso` already.
+    """
+    auto, path = exposure.auto, "exposure.auto.max_iso"
+    if auto is None or auto.max_iso is None:
+        return exposure
+    if base_iso == 0:
+        message = "this camera sees nothing of daylight, and has no ISO speed"
+        raise bad(path, message, "give exposure.auto.max_gain")
+    most = auto.max_iso / base_iso
+    if most < least:
+        message = f"is below ISO {base_iso * least:.4g}, the camera's at gain {least:g}"
+        raise bad(path, message, "raise it")
+    changed = auto.model_copy(update={"max_gain": most})
+    return exposure.model_copy(update={"auto": changed})
+
+
 def gain(exposure: Exposure, base_iso: float, given: float) -> float:
     """Return the gain that an ISO speed asks for, gain = iso / base_iso.
 

@@ -215,6 +215,11 @@ class Solved:
         """What to know of the file: keys that change nothing, and what the silicon is taken for."""
         return (*idle_keys.notes(self.camera), *photodiode.remarks(self.camera))
 
+    @property
+    def limited_exposure(self) -> Exposure:
+        """How the exposure is timed, the largest gain as the largest ISO speed makes it."""
+        return iso_speed.limited(self.exposure, self.base_iso, self.gain)
+
     def electrons_per_exposure(self, light: Spectrum) -> Array:
         """Return the electrons of a pixel on the axis for an exposure of the focal plane.
 

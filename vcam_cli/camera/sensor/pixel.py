@@ -248,9 +248,24 @@ class Defects(Model):
     """Pixels that do not work."""
 
     hot: Fraction = key(
-        "fraction of pixels that read the full well whatever the light", example=1e-4, default=0.0
+        "fraction of pixels that read the full well whatever the light, or have the dark current"
+        " that hot_current says",
+        example=1e-4,
+        default=0.0,
+    )
+    hot_current: Annotated[float | None, Number(above=0, most=1e9, example="200")] = key(
+        "dark current of hot pixels over that of the others, mean of an exponential distribution:"
+        " it grows with time and temperature as theirs does; without it they read the full well",
+        example=200,
+        default=None,
     )
     dead: Fraction = key("fraction of pixels that collect nothing", example=1e-4, default=0.0)
+    columns: Fraction = key(
+        "fraction of columns all of whose pixels collect nothing", example=1e-3, default=0.0
+    )
+    rows: Fraction = key(
+        "fraction of rows all of whose pixels collect nothing", example=1e-3, default=0.0
+    )
 
     @model_validator(mode="after")
     def _check_fractions(self) -> Self:

@@ -16,10 +16,12 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.dark_current import dark_rate
 from vcam_cli.camera.derived.electrical import circuit
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES
 from vcam_cli.effects.signal_chain import NoiseSource, Site
+from vcam_cli.errors import bad
 
 OVERFULL = 100
 """Full wells of charge in a hot pixel: more than the noise of any readout brings below one."""
@@ -31,8 +33,10 @@ class FixedPattern(NoiseSource):
 
     With them dark currents: a pixel's is the mean one times 1 + `dark` z, and never below zero; it
     makes shot noise of its own. And pixels that do not work: a hot one leaks so much that it reads
-    the full well whatever the light is (the clip comes last, and takes the readout noise with it);
-    a dead one collects nothing, and reads offset and readout noise. Which pixels these are does
+    the full well whatever the light is (the clip comes last, and takes the readout noise with it),
+    or has a dark current so many times the mean one, distributed exponentially, whose shot noise is
+    drawn, but not in the stated temporal variance; a dead one, and those of a bad column or row,
+    collects nothing, and reads offset and readout noise. Which pixels these are does
     not depend on the float type, and a larger fraction has the pixels of a smaller one.
 
     A ccd's defects and dark currents stay in their pixels: charge transfer moves mean signals.
@@ -49,6 +53,11 @@ class FixedPattern(NoiseSource):
     """Fractions of the pixels."""
     full_well: float = math.inf
     """Of a pixel [electrons]."""
+    hot_current: float = 0.0
+    """Mean dark current of hot pixels over that of the others; 0: they read the full well."""
+    bad_columns: float = 0.0
+    bad_rows: float = 0.0
+    """Fractions of the columns and rows whose pixels collect nothing."""
     no_columns: str = ""
     """The architecture, where it has no column terms though the file gives them."""
 
@@ -63,7 +72,12 @@ class FixedPattern(NoiseSource):
 
     def __post_init__(self) -> None:
         # Where all pixels are defective they do not differ: the plan would see no noise in it.
-        object.__setattr__(self, "removable", not (self.hot or self.dead))
+        object.__setattr__(self, "removable", not (self.hot or self._lost))
+
+    @property
+    def _lost(self) -> float:
+        """Fraction of the pixels that collect nothing."""
+        return 1 - (1 - self.dead) * (1 - self.bad_columns) * (1 - self.bad_rows)
 
     @classmethod
     def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
@@ -73,10 +87,19 @@ class FixedPattern(NoiseSource):
         missing = any(columns) and not ARCHITECTURES[name].column_terms
         offset, gain = (0.0, 0.0) if missing else columns
         strengths = (fpn.offset_pixel, offset, fpn.gain_pixel, gain, fpn.dark)
-        if not any((*strengths, defects.hot, defects.dead)):
+        lines = defects.columns, defects.rows
+        if not any((*strengths, defects.hot, defects.dead, *lines)):
             return None
+        leak = (defects.hot_current or 0.0) if defects.hot else 0.0
+        if leak and not dark_rate(camera):
+            raise bad(
+                "pixel.defects.hot_current",
+                "there is no dark current that it could multiply",
+                "give pixel.photodetector.dark_current, or remove it",
+            )
         well = circuit(camera).full_well
-        return cls(*strengths, defects.hot, defects.dead, well, name if missing else "")
+        said = name if missing else ""
+        return cls(*strengths, defects.hot, defects.dead, well, leak, *lines, said)
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
@@ -89,6 +112,10 @@ class FixedPattern(NoiseSource):
             said += f"; dark current {100 * self.dark:.3g} %"
         if self.hot or self.dead:
             said += f"; {100 * self.hot:.3g} % hot, {100 * self.dead:.3g} % dead pixels"
+        if self.bad_columns or self.bad_rows:
+            said += (
+                f"; {100 * self.bad_columns:.3g} % bad columns, {100 * self.bad_rows:.3g} % rows"
+            )
         return said
 
     def without_parts(self, names: Collection[str]) -> Self:
@@ -114,8 +141,16 @@ class FixedPattern(NoiseSource):
         if self.hot or self.dead:
             # 64 bits whatever the rest is computed in: the same pixels in both.
             chance = site.stream("fpn defects").random((site.rows, site.columns))
-            mean[chance < self.hot] = OVERFULL * self.full_well
+            if self.hot_current:
+                leak = site.stream("fpn hot").standard_exponential(chance.shape)
+                mean += np.where(chance < self.hot, self.hot_current * site.dark * leak, 0)
+            else:
+                mean[chance < self.hot] = OVERFULL * self.full_well
             mean[chance >= 1 - self.dead] = 0
+        if self.bad_columns:
+            mean[:, site.uniform_columns("fpn bad columns") < self.bad_columns] = 0
+        if self.bad_rows:
+            mean[site.uniform_rows("fpn bad rows")[:, 0] < self.bad_rows] = 0
         return mean
 
     def apply(self, electrons: Array, site: Site) -> Array:
@@ -145,18 +180,32 @@ class FixedPattern(NoiseSource):
         """Return the variance that it adds to a pixel [electrons squared]."""
         offsets = self.offset_pixel**2 + self.offset_column**2
         gains = (self.gain_pixel**2 + self.gain_column**2) * mean**2
-        working = 1 - self.hot - self.dead
+        lost = self._lost
+        if self.hot_current:
+            return self._leaking_variance(mean, dark, offsets, gains)
+        working = 1 - self.hot - lost
         # Of a mixture: the mean variance of its parts, and the variance of their means.
         within = offsets * (1 - self.hot) + (gains + self._dark_variance(dark)) * working
         if not self.hot:
-            return within + self.dead * (1 - self.dead) * mean**2
+            return within + lost * (1 - lost) * mean**2
         center = self.hot * self.full_well + working * mean
         between = self.hot * (self.full_well - center) ** 2 + working * (mean - center) ** 2
-        return within + between + self.dead * center**2
+        return within + between + lost * center**2
+
+    def _leaking_variance(self, mean: float, dark: float, offsets: float, gains: float) -> float:
+        """Variance where hot pixels have a dark current of their own [electrons squared]."""
+        working, leak = 1 - self._lost, self.hot_current * dark
+        within = offsets + (gains + self._dark_variance(dark)) * working
+        center = working * mean + self.hot * leak
+        # The mean square of an exponential distribution is twice its squared mean.
+        square = working * mean**2 + 2 * self.hot * (mean * leak + leak**2)
+        return within + square - center**2
 
     def working_variance(self) -> float:
         """Return the variance of the offsets of working pixels [electrons squared]."""
-        return replace(self, hot=0.0, dead=0.0).variance(0.0)
+        return replace(
+            self, hot=0.0, dead=0.0, hot_current=0.0, bad_columns=0.0, bad_rows=0.0
+        ).variance(0.0)
 
     def _dark_variance(self, dark: float) -> float:
         """Variance of the dark signals [electrons squared]: of a normal number, 0 if below 0."""
