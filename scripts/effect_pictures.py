@@ -167,6 +167,10 @@ EXAMPLES = {
         "Neighbors of other colors get up to a third of a pixel's light: colors fade, if no color"
         " correction undoes it.",
     ),
+    "blooming": Example(
+        (*_chart("hdr-patches"), *GRAY, "pixel.blooming=60 %", "exposure.time=60 ms"),
+        "Excess charge of a lamp fills its columns.",
+    ),
     "dark_current": Example(
         (
             *_chart("step-wedge"),

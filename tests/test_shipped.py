@@ -145,7 +145,7 @@ def test_everything_has_every_effect_of_its_architecture():
     missing = {name for name, effect in described.items() if effect is None}
     assert missing == {
         *("charge_transfer", "reset_noise", "depth", "adc_noise", "distortion", "lateral_color"),
-        *("crosstalk", "jitter"),
+        *("crosstalk", "jitter", "blooming"),
     }
     assert camera.effects == "auto"
 

@@ -318,7 +318,7 @@ def test_what_is_not_simulated_is_said(word):
 
 @pytest.mark.parametrize(
     "guess",
-    ["pixel.readout.blooming=5 %", "array.blooming=5 %", "effects.blooming=on"],
+    ["pixel.readout.smear=5 %", "array.smear=5 %", "effects.smear=on"],
 )
 def test_what_is_not_simulated_is_said_wherever_it_is_looked_for(guess):
     assert "not simulated" in remedy_of(guess)[0]

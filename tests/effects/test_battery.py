@@ -23,6 +23,7 @@ from vcam_cli.effects.base import (
     Charge,
     Gain,
     NeighborSharing,
+    Overflow,
     RadialTransfer,
     SeparableTransfer,
     SignalLevels,
@@ -134,6 +135,14 @@ CASES: dict[str, Case] = {
         {"pixel.crosstalk": {"optical": "1 %", "electrical": "0.5 %"}},
         {"pixel.crosstalk": {"optical": "0 %"}},
         {"scene.source": WAVE},
+    ),
+    "blooming": Case(
+        {"pixel.blooming": "30 %"},
+        {"pixel.blooming": "0 %"},
+        {
+            "scene.source": {"kind": "chart", "chart": "slanted-edge"},
+            "scene.radiance": radiance_for(3e5),
+        },
     ),
     "dark_current": Case(
         {"pixel.photodetector.dark_current": "5 ke/s"},
@@ -556,6 +565,8 @@ def test_finite_on_hostile_input(kind, dtype, tmp_path):
     elif isinstance(effect, VeilingGlare):
         results = [np.array(effect.fraction)]
         assert 0 < effect.fraction <= 1
+    elif isinstance(effect, Overflow):
+        results = [effect.settled(np.array([[-1e9, 0], [1e-30, 0.5], [1e6, 1e12]], dtype))]
     elif isinstance(effect, NeighborSharing):
         signal = np.array([[-1e9, 0], [1e-30, 0.5], [1e6, 1e12]], dtype)
         kernels = [np.array(k.points[0][1])[None] for k in effect.before]

@@ -225,3 +225,14 @@ def test_what_is_not_simulated_is_said(tmp_path):
     ):
         with pytest.raises(BadInput, match=said):
             camera(tmp_path, change | shares(interpixel_capacitance="1 %"))
+
+
+def test_joined_voltages_couple_once(tmp_path):
+    """In the pixels, before they are joined: each shows shares of its neighbors alone."""
+    binned = {"array.binning": {"rows": 2, "columns": 2, "kind": "voltage"}}
+    edge = {"scene.source": {"kind": "chart", "chart": "slanted-edge"}, "effects": QUIET}
+    given = {**WALL, **EXACT, **edge, **shares(interpixel_capacitance="2 %")}
+    pixels = simulate(camera(tmp_path, given)).electrons
+    joined = simulate(camera(tmp_path, given | binned)).electrons
+    expected = pixels.reshape(24, 2, 32, 2).mean(axis=(1, 3))
+    np.testing.assert_allclose(joined, expected, rtol=1e-9)

@@ -39,6 +39,7 @@ CHANGES = {
     "pixel.fpn": {"offset_pixel": "3 e"},
     "pixel.defects": {"hot": 0.01, "dead": 0.01},
     "pixel.crosstalk": {"optical": "1 %"},
+    "pixel.blooming": "10 %",
     "pixel.readout.gain": 2,
     "pixel.readout.read_noise": "9 e",
     "pixel.readout.column_noise": "9 e",

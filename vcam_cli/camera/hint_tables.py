@@ -87,6 +87,7 @@ KEYS: Mapping[str, str] = {
     **dict.fromkeys(("max_iso", "iso_limit"), "exposure.auto: {max: 100 ms, max_iso: 3200}"),
     **dict.fromkeys(("bad_columns", "column_defects"), "pixel.defects: {columns: 0.001}"),
     **dict.fromkeys(("bad_rows", "row_defects"), "pixel.defects: {rows: 0.001}"),
+    **dict.fromkeys(("anti_blooming", "antiblooming"), "pixel.blooming: 20 %"),
     "electrical_crosstalk": "pixel.crosstalk: {electrical: 0.5 %}",
     **dict.fromkeys(
         ("ipc", "interpixel_capacitance"), "pixel.crosstalk: {interpixel_capacitance: 0.5 %}"
@@ -328,10 +329,6 @@ SWITCHES = {
 }
 """A word for a switch -> what it means."""
 NOT_SIMULATED: Mapping[str, str] = {
-    **dict.fromkeys(
-        ("blooming", "anti_blooming", "antiblooming"),
-        "charge beyond the full well is drained, and spills to no neighbor",
-    ),
     "smear": "charge is transferred in no time, and collects no light meanwhile",
     "flash": "the light of the scene is scene.illuminant at one level",
     **dict.fromkeys(

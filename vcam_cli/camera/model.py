@@ -112,6 +112,7 @@ class CameraModel(FileModel):
             *self._capture_mistakes(),
             *self._crosstalk_mistakes(),
             *self._phase_mistakes(),
+            *self._blooming_mistakes(),
             *unmeasured_mistakes(
                 self.expect, self.quality, self.has_edge, self.exposure.has_samples
             ),
@@ -175,6 +176,22 @@ class CameraModel(FileModel):
             if refused:
                 message = f"is not simulated with {what}"
                 yield fault((*path, "interpixel_capacitance"), message, f"{remedy}, or remove it")
+
+    def _blooming_mistakes(self) -> Iterator[InitErrorDetails]:
+        """Yield why the blooming of these pixels cannot be simulated."""
+        if not self.pixel.blooming:
+            return
+        readout, array = self.pixel.readout, self.array
+        several = bool(readout.gains) or readout.small is not None
+        for refused, what, remedy in (
+            (array.is_scattered, "scattered pixels", "write another array.pattern"),
+            (array.summed_charges > 1, "joined charges", "write kind: digital in array.binning"),
+            (self.exposure.captures, "several captures of one integration", "give one time"),
+            (several, "several readouts of one exposure", "remove readout.gains and readout.small"),
+        ):
+            if refused:
+                message = f"is not simulated with {what}"
+                yield fault(("pixel", "blooming"), message, f"{remedy}, or blooming: 0 %")
 
     def _phase_mistakes(self) -> Iterator[InitErrorDetails]:
         """Yield why halves of the lens cannot be told apart."""

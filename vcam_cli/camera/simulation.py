@@ -36,6 +36,7 @@ EFFECTS = {
     "telegraph_noise": "traps in some pixels, filled in some frames",
     "fpn": "differences between pixels and between columns",
     "fpn_shading": "slow differences over the array",
+    "blooming": "charge beyond the full well that spills along columns",
     "saturation": "a pixel holds so many electrons",
     "adc_noise": "noise of the ADC, behind the gain",
     "quantization": "the ADC's whole numbers",

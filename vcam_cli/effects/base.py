@@ -14,6 +14,7 @@ kind says in mathematics what it does, and so where in the order it acts (`order
     VeilingGlare       spreads part of the light over the whole sensor          no unit
     TemporalGain       multiplies the signal by the light of each line's time   no unit
     NeighborSharing    gives part of a pixel's signal to its neighbors          no unit
+    Overflow           moves charge that wells do not hold                      electrons
     Charge             adds electrons                                           electrons
     Transport          moves charge to later pixels on its way out              no unit
     NoiseSource        adds randomness, of known variance                       electrons
@@ -596,6 +597,16 @@ class NeighborSharing(Effect):
     """Of the charge that is counted: neighbors show the same noise."""
     largest_share: float
     """Largest share of a pixel's signal that it gives away."""
+
+
+class Overflow(Effect):
+    """What becomes of charge that wells do not hold."""
+
+    acts_on_light = False
+
+    @abstractmethod
+    def settled(self, charge: Array) -> Array:
+        """Return charges (rows, columns) after their excess has found room [electrons]."""
 
 
 class Charge(Effect):

@@ -23,14 +23,15 @@
                                               heavy_tailed_noise,
                                               correlated_row_noise,
                                               telegraph_noise
+    electrons              Overflow           blooming                       electrons
     electrons              Limit              saturation                     electrons
     electrons              NoiseSource        adc_noise                      electrons
     electrons              Quantizer          quantization                   DN
 
 Kinds are classes of `base.py` and `signal_chain.py`; an aberration that changes over the field is a
 FieldTransfer; `before_shot` is a method of a NoiseSource: it changes the mean signal whose shot
-noise is drawn. Crosstalk has a part that acts behind shot_noise: it couples sense nodes. Warps are
-composed in their order, from the scene to the sensor; where nothing else warps, motion may be a
+noise is drawn. Behind shot_noise, blooming moves charge, and then crosstalk couples sense nodes.
+Warps are composed in their order, from the scene to the sensor; where nothing else warps, motion may be a
 transfer function. Transfer functions multiply, so their order does not matter. Gains act on the
 blurred image: they are taken as constant over a pixel and a point spread function.
 
@@ -51,6 +52,7 @@ from vcam_cli.effects.optics.distortion import Distortion
 from vcam_cli.effects.optics.lateral_color import LateralColor
 from vcam_cli.effects.optics.off_axis import OffAxis
 from vcam_cli.effects.optics.stray_light import StrayLight
+from vcam_cli.effects.pixel.blooming import Blooming
 from vcam_cli.effects.pixel.charge_diffusion import ChargeDiffusion
 from vcam_cli.effects.pixel.charge_transfer import ChargeTransfer
 from vcam_cli.effects.pixel.crosstalk import Crosstalk
@@ -82,6 +84,7 @@ ORDER: tuple[type[Effect], ...] = (
     DarkCurrent,
     ChargeTransfer,
     *SOURCES,
+    Blooming,
     Saturation,
     AdcNoise,
     Quantization,

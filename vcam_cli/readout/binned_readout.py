@@ -25,6 +25,7 @@ def read(
     take: Take,
     bits: int,
     full_charge: Array | None = None,
+    settle: Callable[[Array], Array] | None = None,
 ) -> tuple[Array, Array]:
     """Return one frame of binned pixels.
 
@@ -46,6 +47,8 @@ def read(
         Resolution of the ADC.
     full_charge : Array, optional
         As that of `exposure.capture`, in the shape of `rate` [electrons].
+    settle : callable, optional
+        As that of `exposure.capture`: it acts in the pixels.
 
     Returns
     -------
@@ -60,7 +63,8 @@ def read(
     Trans. Electron Devices 44(10), 1997.
     """
     kind, effects = binning_groups.binning.kind, tuple(effects)
-    take_pixels = take if full_charge is None else partial(take, full_charge=full_charge)
+    in_array = {"full_charge": full_charge, "settle": settle}
+    take_pixels = partial(take, **{n: given for n, given in in_array.items() if given is not None})
     if kind == "charge":
         return take_pixels(rate, time, effects)
     if kind == "digital":

@@ -19,7 +19,6 @@ from vcam_cli.effects.signal_chain import (
     Quantizer,
     Site,
     electron_effects,
-    full_well,
 )
 from vcam_cli.parallel import each, slices_within
 from vcam_cli.rng import BLOCK_ROWS, blocks, stream
@@ -167,7 +166,7 @@ def capture(
     coarse_normals: bool = False,
     full_charge: Array | None = None,
     pedestal: Array | None = None,
-    couple: Callable[[Array], Array] | None = None,
+    settle: Callable[[Array], Array] | None = None,
 ) -> tuple[Array, Array]:
     """Return one frame of an array whose rate of electrons is known.
 
@@ -197,8 +196,9 @@ def capture(
         the full well [electrons].
     pedestal : Array, optional
         What the ADC adds to each pixel beside its offset (rows, columns) [electrons].
-    couple : callable, optional
-        What sense nodes show of the charges of the whole array, in its shape [electrons].
+    settle : callable, optional
+        What sense nodes show of the charges of the whole array, whatever wells hold, in its shape
+        [electrons].
 
     Returns
     -------
@@ -217,7 +217,7 @@ def capture(
         layers = [
             capture(
                 *(plane, time, effects, adc, seeds, workers, None, number, coarse_normals, most),
-                couple=couple,
+                settle=settle,
             )
             for number, (plane, most) in enumerate(zip(rate, full, strict=True))
         ]
@@ -227,22 +227,22 @@ def capture(
     dn = np.empty(rate.shape, codes_type(adc.bits))
 
     in_front = electron_effects(effects, behind_well=False)
-    coupled = (
+    settled = (
         None
-        if couple is None
-        else couple(_charges(rate, time, effects, seeds, workers, layer, coarse_normals))
+        if settle is None
+        else settle(_charges(rate, time, effects, seeds, workers, layer, coarse_normals))
     )
-    if coupled is not None:
+    if settled is not None:
         in_front = tuple(effect for effect in in_front if not effect.in_charge)
 
     def shoot(block: slice) -> None:
         opened = sites(rate, dark, seeds, layer, block, coarse_normals=coarse_normals)
         for rows in slices_within(block, max(1, AT_ONCE // rate.shape[1])):
             here = _at_rows(opened, rows)
-            if coupled is None:
+            if settled is None:
                 tile = _mean_charge(rate[rows], time, effects, here)
             else:
-                tile = coupled[rows]
+                tile = settled[rows]
             for effect in in_front:
                 tile = effect.apply(tile, here[effect.scope])
             if full_charge is not None:
@@ -283,10 +283,9 @@ def _charges(
     layer: int,
     coarse_normals: bool,
 ) -> Array:
-    """Return the charges of all pixels with their noise, as their wells hold them [electrons]."""
+    """Return the charges of all pixels with their noise, whatever wells hold [electrons]."""
     dark, out = mean_dark(time, effects), np.empty_like(rate)
     in_charge = [e for e in electron_effects(effects, behind_well=False) if e.in_charge]
-    well = rate.dtype.type(full_well(effects))
 
     def collect(block: slice) -> None:
         opened = sites(rate, dark, seeds, layer, block, coarse_normals=coarse_normals)
@@ -295,7 +294,7 @@ def _charges(
             tile = _mean_charge(rate[rows], time, effects, here)
             for effect in in_charge:
                 tile = effect.apply(tile, here[effect.scope])
-            np.minimum(tile, well, out=out[rows])
+            out[rows] = tile
 
     each(collect, blocks(len(rate)), workers)
     return out

@@ -218,7 +218,8 @@ def _phase_codes(
         return dn[of_left], dn[of_right]
     time, active = ready.exposure_time, ready.plan.active
     left, right = (
-        take(half, time, active, layer=number)[1] for number, half in enumerate(ready.halves, 1)
+        take(half, time, active, layer=number, settle=ready.settle)[1]
+        for number, half in enumerate(ready.halves, 1)
     )
     return left, right
 
@@ -245,11 +246,11 @@ def take_frame(ready: Prepared, workers: int, stages: Stages | None = None) -> F
                 workers=workers,
                 coarse_normals=coarse,
                 pedestal=_pedestal(ready),
-                couple=ready.couple,
             )
             groups, time = ready.layout.binning_groups, ready.exposure_time
             electrons, dn = binned_readout.read(
-                groups, ready.rate, time, active, take, adc.bits, ready.full_charge
+                *(groups, ready.rate, time, active, take, adc.bits, ready.full_charge),
+                settle=ready.settle,
             )
             return Frame(
                 **known, electrons=electrons, dn=dn, phase_dn=_phase_codes(ready, dn, take)

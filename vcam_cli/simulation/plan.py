@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.effects.base import Charge, Effect, SignalLevels, Transport, of_kind
+from vcam_cli.effects.base import Charge, Effect, Overflow, SignalLevels, Transport, of_kind
 from vcam_cli.effects.order import ORDER
 from vcam_cli.effects.signal_chain import (
     ElectronEffect,
@@ -154,7 +154,7 @@ def _negligible(
     budget = OMITTED_SHARE * variances.tolerance - light.share
     # Late charge is some of the dark signal's: with transport, the two stay together.
     moved = any(transport not in light.omitted for transport in of_kind(present, Transport))
-    kinds = (ElectronEffect,) if moved else (Charge, ElectronEffect)
+    kinds = (ElectronEffect, Overflow) if moved else (Charge, ElectronEffect, Overflow)
     rest = effects.optional(of_kind(present, *kinds))
 
     def mean_share(effect: Effect) -> float:

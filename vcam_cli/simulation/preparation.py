@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -13,7 +14,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import Electrical
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.mosaic import Mosaic
-from vcam_cli.effects.base import ImageMotion, of_kind
+from vcam_cli.effects.base import ImageMotion, Overflow, of_kind
 from vcam_cli.effects.signal_chain import Limit, full_well
 from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.neighbor_sharing import Sharing
@@ -116,15 +117,29 @@ class Prepared:
         mean = exposure.mean_electrons(self.rate, self.exposure_time, self.plan.active)
         if self.full_charge is not None:
             mean = np.minimum(mean, self.full_charge)
+        if (settle := self.settle) is not None:
+            return settle(mean) if mean.ndim == 2 else np.array([settle(plane) for plane in mean])
         clipped: Array = np.minimum(mean, mean.dtype.type(full_well(self.plan.active)))
-        return clipped if self.sharing is None else self.sharing.coupled(clipped)
+        return clipped
 
     @property
-    def couple(self) -> Callable[[Array], Array] | None:
-        """What sense nodes show of charges [electrons]; None where they do not couple."""
-        if self.sharing is None or self.sharing.after is None:
+    def settle(self) -> Callable[[Array], Array] | None:
+        """What sense nodes show of the charges of a whole array (rows, columns) [electrons].
+
+        None where every pixel shows its own.
+        """
+        overflows, well = of_kind(self.plan.active, Overflow), full_well(self.plan.active)
+        couples = self.sharing is not None and self.sharing.after is not None
+        if not couples and not (overflows and math.isfinite(well)):
             return None
-        return self.sharing.coupled
+
+        def settled(charge: Array) -> Array:
+            for overflow in overflows if math.isfinite(well) else ():
+                charge = overflow.settled(charge)
+            held: Array = np.minimum(charge, charge.dtype.type(well))
+            return held if self.sharing is None else self.sharing.coupled(held)
+
+        return settled
 
     @property
     def dark_rate(self) -> float:

@@ -9,7 +9,7 @@ from functools import cached_property
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.readouts import has_several
-from vcam_cli.effects.base import Charge, Effect, of_kind
+from vcam_cli.effects.base import Charge, Effect, Overflow, of_kind
 from vcam_cli.effects.order import ORDER
 from vcam_cli.effects.signal_chain import NoiseSource, Quantizer
 from vcam_cli.errors import Collector
@@ -45,7 +45,7 @@ class CameraEffects:
     @cached_property
     def mean_signal(self) -> tuple[Effect, ...]:
         """The enabled ones that act before electrons are counted, in the order of action."""
-        later = of_kind(self.enabled, Charge, NoiseSource)
+        later = of_kind(self.enabled, Charge, NoiseSource, Overflow)
         return tuple(effect for effect in self.enabled if effect not in later)
 
     def optional(self, effects: Iterable[Effect]) -> tuple[Effect, ...]:

@@ -381,6 +381,12 @@ class Pixel(Model):
     crosstalk: Annotated[Crosstalk | None, word_or(Crosstalk, {"none": None})] = key(
         "what a pixel gives to its neighbors", example="none", default=None
     )
+    blooming: Percent = key(
+        "share of the charge beyond the full well that fills neighbors along the column; a drain"
+        " takes the rest",
+        example="20 %",
+        default=0.0,
+    )
     temperature: SiliconTemperature = key(
         "of the sensor: kTC noise follows it, and dark current that is given at a temperature of"
         " its own",

@@ -1,0 +1,76 @@
+"""Charge beyond the full well that spills along the column.
+
+Of the excess of a full pixel the share `blooming` goes on, half up and half down, and fills the
+neighbors one after the other until it has found room; a drain takes the rest. No charge is lost or
+made but what the drain takes and what leaves at the ends of a column.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from vcam_cli.arrays import Array
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.electrical import circuit
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.effects.base import Overflow, SignalLevels
+from vcam_cli.errors import bad
+
+
+@dataclass(frozen=True)
+class Blooming(Overflow):
+    """Excess charge goes along columns, as their channel stops let it.
+
+    It spills once the exposure ends, noise and all, not while it goes on; none goes along rows. It
+    is not simulated of hot pixels whose charge is not stated.
+    """
+
+    share: float
+    """Share of the excess that the drain leaves."""
+    full_well: float
+    """Of a pixel [electrons]."""
+
+    name = "blooming"
+    reference = "Janesick, Scientific Charge-Coupled Devices, 2001, section 4.2"
+    keys_behind_light = ("pixel.blooming",)
+    absent = "pixel.blooming is 0"
+    seconds_per_pixel = 20e-9
+
+    @classmethod
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
+        """Return the blooming of a camera's pixels, or None where a drain takes all excess."""
+        share, defects = camera.pixel.blooming, camera.pixel.defects
+        if not share:
+            return None
+        if defects.hot and defects.hot_current is None:
+            message = "would spill a charge that is not stated, over the columns' neighbors"
+            raise bad("pixel.defects.hot", message, "add defects.hot_current: 200")
+        return cls(share, circuit(camera).full_well)
+
+    def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
+        return f"{100 * self.share:.3g} % of what wells do not hold goes along the column"
+
+    def mean_error(self, signal: SignalLevels) -> float | None:
+        """Return 0 where no signal comes near the well; elsewhere it is not left out."""
+        return 0.0 if signal.extreme < self.full_well else None
+
+    def settled(self, charge: Array) -> Array:
+        """Return charges (rows, columns) after their excess has found room [electrons]."""
+        well = charge.dtype.type(self.full_well)
+        spilled = np.maximum(charge - well, 0) * charge.dtype.type(self.share / 2)
+        if not spilled.any():
+            return np.asarray(np.minimum(charge, well))
+        # 64 bits: what goes on is a difference of sums over the column.
+        held, half = np.minimum(charge, well).astype(np.float64), spilled.astype(np.float64)
+        for rows in (range(len(held)), range(len(held) - 1, -1, -1)):
+            on_its_way = np.zeros(held.shape[1])
+            for row in rows:
+                taken = np.minimum(on_its_way, self.full_well - held[row])
+                held[row] += taken
+                on_its_way += half[row] - taken
+        settled: Array = held.astype(charge.dtype)
+        return settled
