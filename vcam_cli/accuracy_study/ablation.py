@@ -175,9 +175,11 @@ def _draw_field(
     rate = field / ready.exposure_time - sum(e.rate() for e in charges)
     effects = (*charges, *draws)
     take = partial(exposure.capture, adc=adc, seeds=seeds, workers=workers)
+    sharing = ready.sharing
+    couple = None if sharing is None or sharing.after is None else sharing.coupled
     groups = replace(ready.layout.binning_groups, step=(1, 1))  # all of its pixels are alike
     time = ready.exposure_time
-    found = binned_readout.read(groups, rate, time, effects, take, adc.bits)[0]
+    found = binned_readout.read(groups, rate, time, effects, take, adc.bits, settle=couple)[0]
     found = found / groups.summed_codes
     if any(draw.fills_wells for draw in draws):
         full = full_well(ready.plan.active)

@@ -182,8 +182,19 @@ class Bench:
         seed = self.camera.seed
         # No frame of another frame seed has the same noise.
         seeds = {"sensor": seed.sensor, "frame": seed.frame + (number << 64)}
-        active = self.ready.plan.active
-        return exposure.capture(rate, time, active, adc, seeds, self.workers)[1].astype(rate.dtype)
+        ready = self.ready
+        active, sharing = ready.plan.active, ready.sharing
+        coupled = sharing is not None and sharing.after is not None
+        if coupled and len(ready.mosaic.colors) > 1:  # flat fields of a color would mix twice
+            raise bad(
+                "pixel.crosstalk.interpixel_capacitance",
+                "is characterized on monochrome arrays",
+                "write array.pattern: monochrome, or remove it",
+            )
+        codes = exposure.capture(
+            *(rate, time, active, adc, seeds, self.workers), settle=ready.settle
+        )[1]
+        return codes.astype(rate.dtype)
 
     def color_pixels(self, frame: Array, color: str) -> Array:
         """Return the pixels of one color as lattices of equal size, (lattices, rows, columns)."""
