@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any
 
 from vcam_cli import source_code  # noqa: F401  first: before files change
 
-__version__ = "0.1.0"
+__version__ = "1.0.0"
 _HOMES = {
     "BadInput": "vcam_cli.errors",
     "CannotDo": "vcam_cli.errors",

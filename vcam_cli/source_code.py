@@ -1,9 +1,9 @@
-"""The code that computes: a hash of the package's own files, which results are known by.
+"""A hash of the package's own files, stored with every result.
 
-The version number stays while the code is worked on; two programs that call themselves 0.1.0 may
-compute other numbers. The files are listed with size and time when the package is loaded, and read
-once, when the hash is first asked for. Where the list is another one by then, the program in memory
-is none that is on the disk, and has no hash.
+Between releases the code changes and the version number does not, so that the version alone does
+not identify the code. The files are listed with size and time when the package is loaded, and read
+once, when the hash is first needed. Where the list has changed by then, the program in memory is no
+longer the one on the disk, and has no hash.
 """
 
 import os
