@@ -127,6 +127,7 @@ pixel:
   photodetector: {dark_current: 1000 e/s}
   readout: {full_well: 15 ke, voltage_swing: null, read_noise: 4 e}
   fpn: {gain_pixel: 2 %}
+  blooming: 30 %
 array: {pattern: bayer-rggb}
 exposure: {auto: {max: 100 ms, method: mean, target: 0.5}}
 """,

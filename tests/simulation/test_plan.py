@@ -54,7 +54,13 @@ CAMERAS = {
     "a trace of dark current": {DARK: "300 e/s", "accuracy": "draft"}
     | {"scene.radiance": radiance_for(5e4), "pixel.fpn.shading": {"gain": "1 %"}},
     "a lot of dark current": {DARK: "40 ke/s", "accuracy": "standard"} | NOISE | CSF,
-    "overexposed": {"accuracy": "standard", "scene.radiance": radiance_for(4e5)} | NOISE | LONG,
+    "overexposed": {
+        "accuracy": "standard",
+        "pixel.blooming": "20 %",
+        "scene.radiance": radiance_for(4e5),
+    }
+    | NOISE
+    | LONG,
     "daylight in color": {
         "accuracy": "standard",
         DARK: "100 e/s",
@@ -92,8 +98,9 @@ CAMERAS = {
         "pixel.readout.telegraph_noise": {"fraction": "5 %", "amplitude": "90 e"},
         "adc.noise": "1 DN",
         "pixel.fpn": {"dark": "20 %", "shading": {"offset": "20 e", "gain": "1 %"}},
-        "pixel.defects": {"hot": 0.01, "dead": 0.02},
+        "pixel.defects": {"hot": 0.01, "hot_current": 200, "dead": 0.02},
         "pixel.crosstalk": {"optical": "0.5 %", "interpixel_capacitance": "0.4 %"},
+        "pixel.blooming": "10 %",
         "pixel.microlens": {"gain": 1.5},
         "pixel.stack": {
             "passivation": {"thickness": "0.7 um", "index": 2.0},

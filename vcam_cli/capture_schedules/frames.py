@@ -181,6 +181,9 @@ def check_camera(camera: Camera) -> None:
     if not camera.exposure.captures:
         remedy = "give that camera exposure: {captures: {schedule: optimal, count: 8, max: 100 ms}}"
         raise bad("frames.camera", "takes a single sample of an exposure", remedy)
+    if camera.pixel.blooming:
+        message = "has blooming, which these frames would ignore"
+        raise bad("frames.camera", message, "remove pixel.blooming there")
 
 
 def write_frames(

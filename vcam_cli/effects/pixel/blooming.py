@@ -1,5 +1,7 @@
 """Charge beyond the full well that spills along the column.
 
+    each way along the column = blooming (charge - full well) / 2
+
 Of the excess of a full pixel the share `blooming` goes on, half up and half down, and fills the
 neighbors one after the other until it has found room; a drain takes the rest. No charge is lost or
 made but what the drain takes and what leaves at the ends of a column.
