@@ -109,10 +109,10 @@ def _effects() -> tuple[str, dict[str, bytes]]:
     pictures = {f"effects/{effect.name}.png": _effect_picture(effect.name) for effect in ORDER}
     lines = [
         "# Effects and their equations\n",
-        "In the order in which they act on the light. Numbers of equations without another source",
-        "are those of Chen's thesis. `vcam plan CAMERA` says which of them a scene needs.\n",
-        "Each has two photographs, without it at the left and with it at the right, by a shipped",
-        "camera that was changed until the effect is large: most cameras have less of it.\n",
+        "In the order in which they act. Equation numbers without another source are those of",
+        "Chen's thesis. `vcam plan CAMERA` lists the effects that a scene needs.\n",
+        "Each effect has two photographs, without it (left) and with it (right), from a shipped",
+        "camera in which the effect was exaggerated: most cameras have less of it.\n",
     ]
     return "\n".join([*lines, *(line for effect in ORDER for line in _effect(effect))]), pictures
 
@@ -177,8 +177,8 @@ def _metrics() -> Iterator[str]:
     from vcam_cli.commands.list_ import KINDS
 
     yield "# Metrics\n"
-    yield "What `metrics.csv` and the columns of a sweep may say of a frame. `vcam list metrics`"
-    yield "prints it, `result.metrics` is a mapping of it.\n"
+    yield "Metrics of a frame, in `metrics.csv`, in the columns of a sweep and in `result.metrics`."
+    yield "`vcam list metrics` prints this list.\n"
     for item in KINDS["metrics"]():
         yield f"## {item.name} {{ #{item.name} }}\n\n{sentence(escaped(item.about))}\n"
 
@@ -186,8 +186,8 @@ def _metrics() -> Iterator[str]:
 def _not_simulated() -> Iterator[str]:
     from vcam_cli.camera.hint_tables import NOT_SIMULATED
 
-    yield "# What is not simulated\n"
-    yield "What cameras have and a camera file cannot say, and what is simulated in its place.\n"
+    yield "# Not simulated\n"
+    yield "Properties of cameras that a camera file cannot describe, and their replacement.\n"
     words: dict[str, list[str]] = {}
     for name, about in NOT_SIMULATED.items():
         words.setdefault(about, []).append(name)
@@ -217,8 +217,8 @@ def _words() -> Iterator[str]:
     from vcam_cli.camera.hints import index
 
     keys = {key.dotted: key for key in index()}
-    yield "# Words and their keys\n"
-    yield "What data sheets, photographers and EMVA 1288 call it, and the key that means it.\n"
+    yield "# From terms to keys\n"
+    yield "Terms of data sheets, photographers and EMVA 1288, and the corresponding keys.\n"
     for word, entry in sorted(KEYS.items()):
         path = entry.partition(": ")[0]
         if len(word) > 2:

@@ -39,7 +39,7 @@ class Example:
     sets: tuple[str, ...]
     """What is changed of it, as `--set` has it."""
     shows: str
-    """What is seen, in a sentence."""
+    """The visible difference, in a sentence."""
     camera: str = "starter"
     without: tuple[str, ...] = ()
     """What is changed instead for the photograph at the left; () where the effect is left out."""

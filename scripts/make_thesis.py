@@ -247,7 +247,7 @@ def _cell(
     runs: Runs, file: str, where: Mapping[str, Any], column: str,
     over: Mapping[str, Any] | None = None, db: bool = False,
 ) -> float:  # fmt: skip
-    """Return a cell of a table, or its ratio to that of another row, in dB if asked for."""
+    """Return a cell of a table, or its ratio to that of another row, in dB if requested."""
     numbers = runs[file.partition("/")[0]]["numbers"]
     value = float(numbers[thesis_runs.cell_key(file, where, column)])
     if over:

@@ -269,11 +269,11 @@ python scripts/make_validation.py datasets chromatic-aberration
 TAIL = """## What they say together
 
 - **Means under even light** are predicted within about 1 % rms between the levels that were fitted.
-  What is left is the sensors' own nonlinearity, which a straight line does not have, and flicker of
-  the frames. In the first levels above black of 8 bits a tenth of a code counts as percents.
+  The rest is nonlinearity of the sensors, which a linear model does not have, and flicker of the
+  frames. In the first levels above black of 8 bits a tenth of a code counts as percents.
 - **Temporal noise** is predicted within a few percent where the photon transfer is straight. In the
   8-bit CMOS it bends: the variance grows less than the mean toward saturation, which no linear
-  model has. `vcam fit` says so, widens its intervals, and `vcam verify` misses there as listed.
+  model has. `vcam fit` reports it and widens its intervals; `vcam verify` misses as listed.
 - **Fixed pattern**: its strength is predicted within 10 to 20 %, its distribution over rows and
   columns less well. vcam draws patterns at random; a real sensor has columns and slow shading of
   its own.

@@ -81,7 +81,7 @@ def read(folder: Path) -> tuple[int, list[Level]]:
 
 
 def usable(levels: list[Level]) -> tuple[list[Level], list[Level], list[str]]:
-    """Return dark levels, lit ones by their photons, and what is left out and why."""
+    """Return dark levels, lit ones by their photons, and reasons for exclusions."""
     said = [f"{level.label}: no exposure time" for level in levels if not level.time]
     levels = [level for level in levels if level.time]
     dark = [level for level in levels if not level.photons]
@@ -113,7 +113,7 @@ def _usual_signal(level: Level, lit: list[Level], black: float) -> float:
 
 
 def measurements(folder: Path) -> tuple[dict[str, Any], dict[str, Any], list[str]]:
-    """Return the trees of fit.yaml and verify.yaml, and what is left out."""
+    """Return the trees of fit.yaml and verify.yaml, and reasons for exclusions."""
     bits, levels = read(folder)
     dark, lit, said = usable(levels)
     source = f"frames of {folder.name}, github.com/EMVA1288/datasets, CC BY-SA 3.0"

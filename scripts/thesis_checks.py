@@ -307,7 +307,7 @@ def auto_exposure_time() -> float:
 
 
 def auto_exposure_cap() -> float:
-    """Exposure where the light asks for more than the longest [s]."""
+    """Exposure where the light would need more than the longest [s]."""
     return _exposure(10)
 
 
