@@ -30,7 +30,7 @@ FACTS = {
     "commands.html#exit-codes",
     "effects.html#dark_current",
     "metrics.html#snr_db",
-    "not-simulated.html#blooming",
+    "not-simulated.html#smear",
     "words.html#system_gain",
     "words.html#saturation_capacity",
 }
