@@ -31,15 +31,15 @@ KINDS = (
 MEASURED = ("expect", "cell", "check", "derived", "axis")
 """Kinds with a number of a run."""
 VERDICTS = {
-    "reproduced": "predicted, within what the thesis prints or its axis shows",
-    "calibrated": "within it, but a number was fitted to this very result",
-    "chosen": "within it, with a reading or number that the thesis leaves open",
-    "contradicts": "outside; [the study](studies/pixel-size.md) says why where that is known",
-    "holds": "an equation: vcam's number is what the equation gives by hand",
+    "reproduced": "predicted, within the printed value or the resolution of the printed axis",
+    "calibrated": "within it, with a parameter fitted to this result",
+    "chosen": "within it, with a choice that the thesis leaves open",
+    "contradicts": "outside; [the study](studies/pixel-size.md) gives known reasons",
+    "holds": "an equation: vcam's number equals the result by hand",
     "tested": "an equation, a method or a claim: a test compares it with something independent",
     "missing": "named by the thesis and not in vcam",
     "not simulated": "data that the thesis does not print",
-    "drawing": "a drawing or photograph; what it explains has rows of its own, or is named",
+    "drawing": "a drawing or photograph; its content has rows of its own, or is named",
 }
 RESULTS = ("reproduced", "chosen", "calibrated", "contradicts")
 HEAD = """# The thesis, row by row
@@ -47,7 +47,7 @@ HEAD = """# The thesis, row by row
 <!-- Written by `make thesis` from docs/thesis_runs.json, to which a test holds it. -->
 
 Every figure, table and equation of T. Chen, *Digital Camera System Simulator and Applications*, PhD
-thesis, Stanford University, 2003, with the command or test that answers it. Apart are [its figures
+thesis, Stanford University, 2003, with the command or test for it. Separate pages have [its figures
 over its own axes](thesis-figures.md) and [its tables 2.1 to 2.4](thesis-structures.md).
 """
 
@@ -186,7 +186,7 @@ def page(runs: Runs) -> str:
 
 def _words() -> str:
     lines = [f"| {verdict} | {says} |\n" for verdict, says in VERDICTS.items()]
-    return "| verdict | says |\n|---|---|\n" + "".join(lines)
+    return "| verdict | meaning |\n|---|---|\n" + "".join(lines)
 
 
 def _counts(found: list[str]) -> str:

@@ -257,8 +257,8 @@ def page(datasets: Path, chart: Path, out: Path, target: Path) -> None:
 
 HEAD = """# Validation against public frames
 
-What vcam predicts of real sensors, from public frames that everyone can fetch; they do not ship.
-Every number and picture of this page comes from one command:
+Predictions for real sensors, compared with public frames. The frames do not ship with vcam; one
+command writes every number and picture of this page:
 
 ```text
 git clone https://github.com/EMVA1288/datasets
@@ -266,7 +266,7 @@ git clone https://github.com/bllanos/chromatic-aberration
 python scripts/make_validation.py datasets chromatic-aberration
 ```
 """
-TAIL = """## What they say together
+TAIL = """## Conclusions
 
 - **Means under even light** are predicted within about 1 % rms between the levels that were fitted.
   The rest is nonlinearity of the sensors, which a linear model does not have, and flicker of the
@@ -275,18 +275,18 @@ TAIL = """## What they say together
   8-bit CMOS it bends: the variance grows less than the mean toward saturation, which no linear
   model has. `vcam fit` reports it and widens its intervals; `vcam verify` misses as listed.
 - **Fixed pattern**: its strength is predicted within 10 to 20 %, its distribution over rows and
-  columns less well. vcam draws patterns at random; a real sensor has columns and slow shading of
-  its own.
+  columns less well. vcam draws patterns at random; a real sensor has particular columns and
+  shading.
 - **Spectra**: the chart's errors are several times those of means under even light, and those of a
-  patch repeat from exposure to exposure. So they lie in the light and in the spectra of patches,
-  filters and lamp, or in vcam's use of them, and not in the response of the sensor. The set cannot
-  tell these apart: they bound vcam's spectral error from above.
+  patch repeat from exposure to exposure. So they come from the light, from the spectra of patches,
+  filters and lamp, or from vcam's use of them, and not from the response of the sensor. The set
+  cannot separate these: they are an upper bound on vcam's spectral error.
 - **Dark current** of the chart's camera is not judged: with 8 bits and black cut off at 0 its mean
   code is 0.006 after 4 s.
 
-None of these sensors has published process data or an absolute efficiency by wavelength. All of the
-above is fitted on half of the frames and predicted on the others, which is less than a prediction
-from a design.
+None of these sensors has published process data or an absolute efficiency by wavelength. All models
+above are fitted to half of the frames and predict the others, a weaker test than a prediction from
+a design.
 """
 
 
