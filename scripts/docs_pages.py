@@ -187,7 +187,9 @@ def _not_simulated() -> Iterator[str]:
     from vcam_cli.camera.hint_tables import NOT_SIMULATED
 
     yield "# Not simulated\n"
-    yield "Properties of cameras that a camera file cannot describe, and their replacement.\n"
+    yield "Light transport in three dimensions, polarization, interference, lens coatings and"
+    yield "ghosts, radiation damage, and event, single-photon and time-of-flight sensors are not"
+    yield "simulated. A camera file cannot describe these further properties:\n"
     words: dict[str, list[str]] = {}
     for name, about in NOT_SIMULATED.items():
         words.setdefault(about, []).append(name)
