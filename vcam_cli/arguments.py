@@ -28,7 +28,7 @@ def require_overrides(given: Any) -> None:
 
 
 def require_folder(given: Any) -> Path:
-    """Return the path of a folder. Raise TypeError for what is none."""
+    """Return the path of a folder. Raise TypeError for other types."""
     if not isinstance(given, str | PathLike) or isinstance(given, bytes):
         raise TypeError(f'{brief(given)} is no folder; write "out/mine"')
     return Path(given)

@@ -158,7 +158,7 @@ def dataset(
 ) -> DatasetResult:
     """Write the labeled frames of a data set into `out`, default out/NAME: `vcam dataset`.
 
-    Its arguments are those of `sweep`; seed and accuracy stand for those of the files.
+    Its arguments are those of `sweep`; seed and accuracy replace those of the files.
     """
     from vcam_cli.datasets import dataset as work
     from vcam_cli.datasets import dataset_file

@@ -12,7 +12,7 @@ T = TypeVar("T")
 
 
 def own_float_errors(function: Callable[P, T]) -> Callable[P, T]:
-    """Return a function that neither heeds the caller's `np.seterr` nor changes it.
+    """Return a function that neither uses the caller's `np.seterr` nor changes it.
 
     What underflows is 0, as the computations take it; all else is a warning of NumPy.
     """

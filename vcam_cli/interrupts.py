@@ -46,7 +46,7 @@ def exit_on_interrupt() -> Iterator[None]:
 def raise_interrupts() -> Iterator[None]:
     """Raise interrupts as KeyboardInterrupt, and ignore them after the end of the context.
 
-    For a process that ends with this context: what is left then is the end of Python.
+    For a process that ends with this context: only Python's own end follows.
     """
     report, sys.unraisablehook = sys.unraisablehook, _raise_again
     try:

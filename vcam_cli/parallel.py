@@ -42,7 +42,7 @@ def available_workers() -> int:
 
 
 def suitable_workers(pixels: int) -> int:
-    """Return the number of threads that suits a frame of so many pixels.
+    """Return the number of threads that suits a frame of `pixels` pixels.
 
     Half a megapixel takes a fifth longer with two threads than with one; a whole one gains a tenth
     by the clock and takes a third more of the processors.
@@ -102,7 +102,7 @@ def results(work: Callable[[Item], Result], items: Iterable[Item], workers: int)
 
 
 def rows_at_once(values: int) -> int:
-    """Return the number of rows or columns of so many values that are worked on together.
+    """Return the number of rows or columns of `values` values that are processed together.
 
     Few enough for the cache; more of short ones, since every piece costs some calls.
     """

@@ -38,7 +38,7 @@ class Silent:
 
 
 class Timekeeper:
-    """An observer that knows how long the work goes on, as far as that can be told."""
+    """An observer that estimates how long the work takes."""
 
     def __init__(self) -> None:
         self._start = self._stage_start = clock.monotonic()

@@ -1,7 +1,7 @@
 """Quantities: text with a unit <-> float in SI.
 
 `parse("6.5 um", "length")` is 6.5e-6 and `render(6.5e-6, "length")` is "6.5 um". A quantity
-is a number or a quotient of two ("1/60 s"), then a unit of the dimension that is asked for;
+is a number or a quotient of two ("1/60 s"), then a unit of the requested dimension;
 a bare number, NaN, infinity or another dimension's unit is a ValueError whose text is meant
 for the user.
 
@@ -226,7 +226,7 @@ def _value(
     offset: Fraction | None,
     size: Fraction,
 ) -> float:
-    """Return number / divisor in SI as the nearest double; ValueError where there is none."""
+    """Return number / divisor in SI as the nearest double; ValueError without one."""
     if divisor is not None:
         if Fraction(divisor) == 0:
             raise ValueError(f"{text!r} divides by zero; write for example {kind.example}")
@@ -254,7 +254,7 @@ def decimal(number: Decimal) -> str:
 def _prefixed_units(
     unit: str, prefixes: str, power: int = 1, scale: int = 0
 ) -> dict[str, Fraction]:
-    """{"um": 1e-6, ...}: `unit` with every prefix ("-" stands for none), to a power."""
+    """{"um": 1e-6, ...}: `unit` with every prefix ("-": no prefix), to a power."""
     names = ["" if letter == "-" else letter for letter in prefixes]
     return {p + unit: Fraction(10) ** (_PREFIXES[p] * power + scale) for p in names}
 

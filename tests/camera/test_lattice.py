@@ -218,7 +218,7 @@ def grid(x0, y0, rows=6, columns=8, pitch=5.0):
 )
 def test_an_array_beside_the_picture_is_refused(x0, y0, tmp_path):
     """With what to subtract: the middle of the array."""
-    with pytest.raises(BadInput, match="beside the middle") as caught:
+    with pytest.raises(BadInput, match="outside the array") as caught:
         scattered(tmp_path, grid(x0, y0))
     remedy = caught.value.problems[0].remedy
     assert f"subtract {x0 + 17.5:g} from x_um and {y0 + 12.5:g} from y_um" in remedy

@@ -259,7 +259,7 @@ class TestSwing:
 
     def test_nothing_left_of_the_supply(self, tmp_path):
         choice = {"from": "cmos-0.35um", "thresholds": {"reset": "3.3 V"}}
-        assert "passes nothing of a supply of 3.3 V" in refused(tmp_path, technology=choice)
+        assert "blocks a supply of 3.3 V" in refused(tmp_path, technology=choice)
 
     def test_more_than_the_reset_voltage(self, tmp_path):
         text = refused(tmp_path, readout={"voltage_swing": "2.3 V"})

@@ -85,5 +85,5 @@ def test_a_scale_that_cannot_act_is_refused(study, pdf, said):
         schedule_file.read(study(pdf))
     path = study(TABLE % ", brightest: 4 ke/s")
     path.write_text(path.read_text().partition("sensor")[0])
-    with pytest.raises(BadInput, match="changes nothing: without a sensor"):
+    with pytest.raises(BadInput, match="has no effect: without a sensor"):
         schedule_file.read(path)

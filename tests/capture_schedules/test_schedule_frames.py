@@ -174,7 +174,7 @@ def test_that_is_told_before_any_light_is_simulated(tmp_path, monkeypatch):
     monkeypatch.setattr(photocurrents, "camera_photocurrents", simulated)
     study = tmp_path / "study.yaml"
     study.write_text("kind: schedule\npdf: {camera: starter}\ncounts: [2]\nframes: {count: 2}\n")
-    with pytest.raises(BadInput, match=r"study.yaml:4:9: frames.camera: takes a single sample"):
+    with pytest.raises(BadInput, match=r"study.yaml:4:9: frames.camera: has a single sample"):
         schedule(study, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
@@ -304,7 +304,7 @@ def test_mistakes_of_pictures_are_told_with_their_places(tmp_path):
     (tmp_path / "other").mkdir()
     single = camera(tmp_path / "other", SCENE | {"exposure": {"time": "5 ms"}})
     text = studied(tmp_path, "{uniform: {min: 0, max: 1}}", f"{{camera: {single.origin}}}")
-    with pytest.raises(BadInput, match=r"study.yaml:4:18: frames.camera: takes a single sample"):
+    with pytest.raises(BadInput, match=r"study.yaml:4:18: frames.camera: has a single sample"):
         schedule(text, tmp_path / "out")
 
 

@@ -122,9 +122,9 @@ def test_what_is_written_is_read_as_the_same_study(changes):
         ({"methods": ["optimum"]}, "did you mean optimal?"),
         ({"methods": []}, "methods: is an empty list; write for example [optimal]"),
         ({"methods": ["weighted"]}, "methods.0: weighted needs a sensor"),
-        ({"constraints": {"min_gap": "1 ms"}}, "constraints.min_gap: is a time, and without a se"),
+        ({"constraints": {"min_gap": "1 ms"}}, "constraints.min_gap: is a time and needs a sensor"),
         ({"online": True}, "online: online needs a sensor"),
-        ({"starts": 4}, "starts: changes nothing: no method of the study has random starts; add"),
+        ({"starts": 4}, "starts: has no effect: no method of the study has random starts; add"),
         (
             {"max_time_of": 10, "sensor": SENSOR | {"max_time": "1 s"}},
             "max_time_of: is a longest exposure, and so is sensor.max_time; keep one",

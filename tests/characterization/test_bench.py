@@ -139,7 +139,7 @@ REFUSED = {
         {"array.pattern": "honeycomb", "output.render": "none"},
         "rows and columns",
     ),
-    "array.binning": ({"array.binning": {"rows": 2, "columns": 2}}, "read one by one"),
+    "array.binning": ({"array.binning": {"rows": 2, "columns": 2}}, "unbinned pixels"),
     "effects.shot_noise": ({"effects": {"shot_noise": "off"}}, "switched off"),
     "adc.bits": ({"adc": {"bits": 3}}, "lost in rounding"),
     "exposure": ({"pixel.photodetector.dark_current": "4000 ke/s"}, "dark current alone"),

@@ -121,7 +121,7 @@ def test_it_stands_beside_a_run_in_the_same_folder(tmp_path):
     ("sets", "words"),
     [
         ("adc.kind=logarithmic", "adc.kind: EMVA 1288 measures linear cameras"),
-        ("effects={shot_noise: off}", "effects.shot_noise: the photon transfer measures"),
+        ("effects={shot_noise: off}", "effects.shot_noise: photon transfer needs shot noise"),
         ("adc.bits=2", "adc.bits: the noise of light"),
         ("adc.bits=two", "adc.bits"),
     ],

@@ -194,7 +194,7 @@ def test_ctrl_c_says_that_points_are_kept():
     out, err = process.communicate(timeout=60)
     assert (process.returncode, out) == (130, "")
     last = err.splitlines()[-1]  # on a busy machine, stages are told before it
-    assert last == "interrupted; finished points are kept, the same command goes on with them"
+    assert last == "interrupted; finished points are kept, and the same command continues"
     assert not list(Path("out/study/points").glob("*.part"))
 
 

@@ -37,7 +37,7 @@ def said(tmp_path, *arguments):
         ("run mine.yaml photo.jpg", '--set scene.source="{kind: image, file: photo.jpg}"'),
         ("run mine.yaml --set pixel.width=3 um", "in quotes"),
         ("run mine.yaml --set pixel.width:", 'write pixel.width="VALUE"'),
-        ("run mine.yaml --resume", "the same command goes on"),
+        ("run mine.yaml --resume", "repeat the command to continue"),
         ("run mine.yaml --jobs 2", "--workers"),
         ("run mine.yaml --exposure 1", "--set"),
         ("list lens", "did you mean lenses?"),

@@ -182,7 +182,7 @@ def test_a_formula_changes_no_other_draw(tmp_path):
             "is no number",
         ),
         ({"exposure.time": {"from": "1 ms", "uniform": ["1 ms", "2 ms"]}}, "cannot both be given"),
-        ({"exposure.time": {"uniform": ["1 ms", "2 ms"], "scatter": 1}}, "only what a formula"),
+        ({"exposure.time": {"uniform": ["1 ms", "2 ms"], "scatter": 1}}, "scatter applies only to"),
         ({"exposure.time": {"from": "1 ms + 1 e"}}, "do not add"),
         ({"exposure.time": {"from": "3 e"}}, "is a charge in electrons, not a time"),
         ({"exposure.time": {"from": 7}}, "7 is no formula"),

@@ -168,7 +168,7 @@ def test_headers_as_instruments_write_them(header, tmp_path):
     ("text", "said"),
     [
         ("", "is empty"),
-        ("time_s,pan\n0,1\n1,2\n", "'pan' does not say its unit"),
+        ("time_s,pan\n0,1\n1,2\n", "'pan' has no unit"),
         ("pan_deg,tilt_deg\n0,1\n1,2\n", "the header is"),
         ("time_s,acc_x\n0,1\n1,2\n", "the header is"),
         ("time_s,pan_deg,yaw_deg\n0,1,1\n1,2,1\n", "the header is"),

@@ -110,7 +110,7 @@ def test_an_amount_of_no_light_is_refused(plain):
     folder, form = plain
     frames = [dict(entry) for entry in form["frames"]]
     frames[0]["photons"] = 100
-    with pytest.raises(BadInput, match="light is none, and there is an amount of it"):
+    with pytest.raises(BadInput, match="`light: none` excludes an amount of light"):
         fitted(form, folder, frames=frames)
 
 

@@ -49,7 +49,7 @@ def test_a_drawn_camera_comes_back(taken):
         p = named[name]
         assert abs(p.value - value) <= 5 / 1.645 * (p.high - p.low) / 2, name
         assert p.low < p.value < p.high
-    assert found.unknown == ["sharpness: there are no frames of an edge"]
+    assert found.unknown == ["sharpness: needs frames of an edge"]
     assert found.notes == []
 
 
@@ -182,7 +182,7 @@ def test_traps_and_shading_are_found(tmp_path):
         p = named[name]
         assert abs(p.value - value) <= 5 / 1.645 * (p.high - p.low) / 2, name
     assert "read_noise_shape" not in named
-    assert "flat frames are not even" in " ".join(found.notes)
+    assert "flat frames are not uniform" in " ".join(found.notes)
     (tmp_path / "found.yaml").write_text(yaml.safe_dump(found.camera))
     told = load(tmp_path / "found.yaml").pixel
     assert told.readout.telegraph_noise.occupancy == pytest.approx(0.3, abs=0.1)
@@ -305,7 +305,7 @@ def test_the_command_writes_camera_table_and_json(taken, tmp_path):
         assert (tmp_path / "out" / f"{name}.png").stat().st_size > 1000
         assert (tmp_path / "out" / f"{name}.svg").read_text("utf-8").startswith("<?xml")
         assert page.count(f"{name}.png") > 0
-    assert "not told by the frames: sharpness" in page
+    assert "not determined by the frames: sharpness" in page
     assert json.loads((tmp_path / "out" / "fit.json").read_text())["unknown"]
 
 

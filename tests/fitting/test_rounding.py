@@ -1,4 +1,4 @@
-"""Noise that rounding to whole codes hides: no interval leaves the truth out."""
+"""Noise that quantization masks: no interval leaves the truth out."""
 
 import math
 
@@ -50,7 +50,7 @@ def test_intervals_hold_what_is_under_half_a_code(sensor, tmp_path):
         limit = math.sqrt(0.24 - 1 / 12) / found.value("system_gain")
         assert named["read_noise"].value == pytest.approx(limit, rel=1e-6)
         assert "eq 54" in named["read_noise"].method
-        assert "rounding to whole codes hides the read noise" in " ".join(found.notes)
+        assert "quantization masks the read noise" in " ".join(found.notes)
     gain = named["system_gain"]
     assert abs(gain.value - sensor.gain) < 5 / 1.645 * (gain.high - gain.value)
 

@@ -251,7 +251,9 @@ def test_arrays_packed_as_numpy_does_not(kind, tmp_path):
     data[60:75] = bytes(15)
     (tmp_path / "c.npz").write_bytes(data)
     for name in ("b.npz", "c.npz"):
-        with pytest.raises(BadInput, match=r"is not packed as NumPy does it|is no whole npz file"):
+        with pytest.raises(
+            BadInput, match=r"is not packed as NumPy does it|is no complete npz file"
+        ):
             read_cube(tmp_path / name, "file")
 
 

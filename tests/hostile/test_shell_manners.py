@@ -258,8 +258,8 @@ def test_a_damaged_picture_is_refused_in_our_words(tmp_path, monkeypatch, name, 
 REASONS = {
     f"OpenEXR exception: /a/{STAGING}/x.exr ({os.strerror(27)}) at 0x123456789": "larger than",
     f'Cannot write "/a/.x.1-2.part": {os.strerror(122)}.': "quota",
-    "": "could not be written whole",
-    "libpng error: 0xdeadbeef in foo.cpp": "could not be written whole",
+    "": "could not be written completely",
+    "libpng error: 0xdeadbeef in foo.cpp": "could not be written completely",
 }
 
 

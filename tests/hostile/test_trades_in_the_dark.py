@@ -146,7 +146,9 @@ def test_benches(sees, treatment, tmp_path, monkeypatch):
 @pytest.mark.parametrize("sees", ["silicon", "transmittance"])
 def test_a_bench_with_nothing_to_measure_says_so(sees, tmp_path):
     made = load(camera_file(tmp_path, "starter", SEES[sees]))
-    with pytest.raises(BadInput, match=r"the pixels see nothing of this light; .* transmittance"):
+    with pytest.raises(
+        BadInput, match=r"the pixels do not respond to this light; .* transmittance"
+    ):
         characterize(made)
 
 

@@ -82,7 +82,7 @@ def test_the_dark_end_of_a_wide_range_keeps_its_digits():
         ([1], [0], [1], "below its min"),
         ([0, 1], [1, 1], [1, 1], "not both"),
         ([2, 1], [2, 1], [1, 1], "rise"),
-        ([0], [0], [1], "nothing to capture"),
+        ([0], [0], [1], "no photocurrent is above 0"),
         ([0, 1], [1, 2], [1], "as many probabilities"),
     ],
 )
@@ -96,7 +96,7 @@ def test_what_is_no_pdf_is_refused(low, high, probability, says):
     [
         (lambda: Pdf.uniform(1, 1), "above its min"),
         (lambda: Pdf.segments([0, 1], [1, 1], [1, 1]), "above its min"),
-        (lambda: Pdf.levels([0.0], [1]), "nothing to capture"),
+        (lambda: Pdf.levels([0.0], [1]), "no photocurrent is above 0"),
         (lambda: Pdf.levels([1.0, 2.0], [1]), "as many weights"),
         (lambda: Pdf.levels([], []), "empty"),
         (lambda: Pdf.levels([1.0], [0]), "zero"),

@@ -154,7 +154,7 @@ def test_what_is_not_simulated_is_said(tmp_path):
     for change, said in (
         ({"pixel.phase_detection": "both"}, "dual"),
         ({"pixel.phase_detection": {"masked": {"period": 16}}}, "pair"),
-        ({"pixel.phase_detection": "none", "output.phase": True}, "no pixels that see"),
+        ({"pixel.phase_detection": "none", "output.phase": True}, "needs phase-detection pixels"),
         ({"array.binning": {"rows": 2, "columns": 2, "kind": "charge"}}, "binned pixels"),
         ({"array.pattern": "honeycomb"}, "stacked or scattered"),
     ):

@@ -290,7 +290,7 @@ def test_figures_of_a_former_study_go(tmp_path):
         (MTF | {"over": "adc.bit"}, "over", "pixel.width"),
         (MTF | {"set": {"optics.f_numbr": 2}}, "set", "f_number"),
         (MTF | {"set": {"pixel.width": "6 um"}}, "set", "is varied by"),
-        (MTF | {"quantities": ["relative_qe"]}, "show", "all collect alike"),
+        (MTF | {"quantities": ["relative_qe"]}, "show", "all pixels collect equally"),
         (SNR | {"quantities": ["feature_size"]}, "show", "has no feature_size"),
         (SNR | {"set": {"exposure": {"auto": {"max": "1 s"}}}},
          "show", "depends on the exposure time"),

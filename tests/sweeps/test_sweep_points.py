@@ -85,7 +85,7 @@ def test_log_spacing_has_equal_ratios_and_the_ends_given(tmp_path):
     ("range_", "said"),
     [
         ({"start": "0 ms", "stop": "1 s", "count": 3, "spacing": "log"}, "needs ends above zero"),
-        ({"values": ["1 ms"], "spacing": "log"}, "listed have no spacing"),
+        ({"values": ["1 ms"], "spacing": "log"}, "list of values has no spacing"),
         ({"start": "1 ms", "stop": "1 s", "count": 3, "spacing": "lg"}, "log"),
     ],
 )

@@ -107,7 +107,7 @@ def test_edges_are_left_out_with_a_word(taken):
     [
         ({}, {"levels": {"bits": 10}}, r"levels.bits.*10 bits, and the camera's ADC 12"),
         ({}, {"pattern": "monochrome"}, r"pattern: the frames have Y, the camera B, G, R"),
-        ({"irradiance": None}, {}, "how much light there is, is missing"),
+        ({"irradiance": None}, {}, "the amount of light is missing"),
         ({"files": "nothing_*.dng"}, {}, "0 files in"),
     ],
 )

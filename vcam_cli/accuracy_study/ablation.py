@@ -63,7 +63,7 @@ class Ablation:
 
 
 def with_effects(camera: Camera, every: str, *left_out: str) -> Camera:
-    """Return the camera with what its file wants on `auto` or `on`, but for what is left out.
+    """Return the camera with what its file wants on `auto` or `on`, without the effects left out.
 
     What the file itself switches off stays off.
     """
@@ -150,7 +150,7 @@ def variance_shares(ready: Prepared, full: float, workers: int) -> dict[str, flo
 
 
 def _rounding_share(adc: Quantizer, electrons: Array, times: int) -> float:
-    """Mean square of the rounding error, a mean of so many, over the variance with it."""
+    """Mean square of the averaged rounding error over the total variance."""
     line = adc.response(electrons.copy())
     ends = electrons.mean() * np.array([1.0, 1.001]) + np.array([0.0, 1.0])
     per_code = float(np.diff(ends)[0] / np.diff(adc.response(ends.copy()))[0])

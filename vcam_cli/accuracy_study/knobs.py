@@ -37,12 +37,12 @@ class Knob:
 
 def _no_spectrum(ready: Prepared) -> str:
     followed = ready.spectrum.oversampling > 0
-    return "" if followed else "the scene is known in closed form, without samples"
+    return "" if followed else "the scene has a closed form and needs no samples"
 
 
 def _no_blur(ready: Prepared) -> str:
     blurs = ready.transfer.effects or _no_field_blur(ready) == ""
-    return "" if blurs else "nothing blurs the picture by its wavelength"
+    return "" if blurs else "no blur depends on wavelength"
 
 
 def _no_table(ready: Prepared) -> str:
@@ -62,7 +62,7 @@ def _no_field_blur(ready: Prepared) -> str:
 
 def _no_sub_exposures(ready: Prepared) -> str:
     taken = ready.spectrum.sub_exposures
-    return "" if taken > 1 else "no motion asks for sub-exposures"
+    return "" if taken > 1 else "no motion needs sub-exposures"
 
 
 def _no_effect(name: str, without: str) -> Callable[[Prepared], str]:
@@ -99,7 +99,7 @@ KNOBS: tuple[Knob, ...] = (
         _no_effect("pixel_vignetting", "no tunnel above the photodetector is described"),
         ({"vignetting_points": 129},),
     ),
-    # As many as a tenth of the tolerance asks for.
+    # As many as a tenth of the tolerance requires.
     Knob("spectral_rank", _by_label(2, 3, 4, 6), None, _no_rank, ({"tolerance": CONVERGED / 10},)),
     Knob(
         "field_zones",

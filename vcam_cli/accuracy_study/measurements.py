@@ -41,7 +41,7 @@ class Shot:
     mean: Array
     """Noise-free raw signal [electrons]"""
     clean: Array | None
-    """(rows, columns, channels) its render in linear light; None where there is none to judge."""
+    """(rows, columns, channels) its render in linear light; None without a render to judge."""
     noisy: Array | None
     """The same of the frame as it is, with its noise."""
 

@@ -54,7 +54,7 @@ def pareto_arguments(found: Study) -> tuple[Any, ...]:
         if pairs:
             panels.append((f"change by leaving it out, {label}", pairs))
     tolerance = found.camera.accuracy.tolerance
-    title = f"{found.camera.name}: what accuracy costs"
+    title = f"{found.camera.name}: accuracy and time"
     return title, points("preset", "tolerance"), curves, tolerance, panels, points("all")
 
 
@@ -67,13 +67,13 @@ def report_arguments(found: Study) -> dict[str, Any]:
     ]
     facts += [(f"{knob} does not apply", why) for knob, why in found.absent.items()]
     captions = {
-        "accuracy.csv": "Errors are relative to full signal, of the mean raw frame against the"
-        " reference; a knob's is its own, with all others converged.",
-        "accuracy.png": "Error over seconds of every preset and along every knob; what the plan"
-        " expected of each effect over what leaving it out did",
+        "accuracy.csv": "Errors of the mean raw frame against the reference, relative to full"
+        " signal; of a setting with all others converged.",
+        "accuracy.png": "Error over seconds of every preset and setting; the plan's estimate of"
+        " each effect over its measured effect",
     }
     about = "Error of the mean raw frame against a converged reference, and the seconds it takes."
-    title = f"{found.camera.name}: what accuracy costs"
+    title = f"{found.camera.name}: accuracy and time"
     return {
         "title": title,
         "about": about,

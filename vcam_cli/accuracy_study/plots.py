@@ -90,7 +90,7 @@ def _error_over_time(
     _presets(axes, presets)
     axes.axhline(tolerance, color="#888888", lw=0.9, ls=(0, (4, 3)), zorder=1)
     axes.annotate(
-        f"asked for: {100 * tolerance:.3g} %",
+        f"tolerance: {100 * tolerance:.3g} %",
         (1, tolerance),
         xycoords=("axes fraction", "data"),
         xytext=(-2, 3),
@@ -105,8 +105,8 @@ def _error_over_time(
     axes.set_ylabel("rms error of the mean raw, relative to full signal")
     if curves:
         below = {"loc": "upper left", "bbox_to_anchor": (0, -0.13), "ncols": 4, "fontsize": 7.5}
-        axes.legend(**below, borderaxespad=0, title="one knob changed, its own error: coarsest"
-                    " and finest setting are written beside", title_fontsize=7.5)  # fmt: skip
+        axes.legend(**below, borderaxespad=0, title="error of one setting at a time; the coarsest"
+                    " and finest values are labeled", title_fontsize=7.5)  # fmt: skip
 
 
 def _curve(axes: Any, curve: Curve, color: str, marker: str, number: int) -> None:
@@ -145,7 +145,7 @@ def _everything(
     presets: Sequence[tuple[float, float, str]],
     everything: Sequence[tuple[float, float, str]],
 ) -> None:
-    """Draw squares for presets with every effect on, each tied to that which is planned."""
+    """Draw squares for presets with every effect on, each tied to the planned setting."""
     planned = {name: (x, max(y, FLOOR)) for x, y, name in presets}
     for x, error, name in everything:
         y = max(error, FLOOR)

@@ -1,4 +1,4 @@
-"""Which setting to take: the fastest that keeps what the file asks for, and what it loses."""
+"""Which setting to take: the fastest within the file's tolerance, and its error."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def _none_meets(camera: Camera, points: tuple[Point, ...], tolerance: float) -> 
     """Return a sentence on the least error where no setting meets the file's tolerance."""
     least = min((p for p in points if p.knob in PROMISED), key=lambda p: p.rms_error)
     return (
-        f"none: no setting is known to meet the {_percent(tolerance)} of the file and its own"
+        f"none: no tested setting meets the {_percent(tolerance)} of the file and its own"
         f" tolerance; {_quoted(camera, least)} has the least rms error,"
         f" {_percent(least.rms_error)} of full signal."
     )

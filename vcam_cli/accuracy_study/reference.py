@@ -1,8 +1,9 @@
 """What settings are compared with: the camera with everything on, converged.
 
 Why an estimate of its own error stands beside it: edges of a chart are good to the power 5/2 of the
-cells per pixel, and the last digit costs more memory than there is. What is left is told by the
-change of the last refinement; errors ten times larger are not changed by it.
+cells per pixel, and the last digit costs more memory than there is. The
+change of the last refinement estimates the remaining error; it does not change errors ten times
+larger.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from vcam_cli.simulation.simulate import prepare
 FURTHER = 2.5
 """How much further than `accuracy: reference` a spectrum is followed: its error falls tenfold."""
 FINEST_CELLS = 256
-"""Largest oversampling that a camera file may ask for."""
+"""Largest oversampling that a camera file may set."""
 FINEST_OF_RECTANGLES = 64
 """How far a chart is followed whose spectrum is known [pixel Nyquist]."""
 ORDER = 2.5
@@ -64,8 +65,8 @@ def finest_camera(camera: Camera, coarse: Prepared, most_bytes: float = 0) -> Ca
     """Return the camera with everything on and every knob finer than its reference.
 
     coarse: the camera at `accuracy: reference`. Where its scene has a spectrum, it is followed
-    two and a half times as far as there, or painted on so many times its cells, an odd number, as
-    long as so many bytes suffice; 0: `MOST_BYTES`. A chart whose spectrum is known is followed to
+    to two and a half times that frequency, or painted on an odd multiple of its cells that fits a
+    number of bytes; 0: `MOST_BYTES`. A chart whose spectrum is known is followed to
     `FINEST_OF_RECTANGLES`.
     """
     knobs: dict[str, Any] = dict(FINEST)

@@ -38,7 +38,7 @@ class Point:
     seconds_spread: float
     """Slowest less fastest run [s]"""
     mean_s_cielab: float | None = None
-    """Between the render and that which it is compared with; None without a render."""
+    """Between the render and its reference; None without a render."""
     predicted: float | None = None
     """Rms of what the plan expects the settings to lose of the spectrum, relative."""
     left_out: tuple[str, ...] = ()
@@ -46,7 +46,7 @@ class Point:
     variance_lost: float = 0.0
     """Largest share of the temporal or fixed-pattern variance that they had."""
     unsure: float = 0.0
-    """Rms by which that which it is compared with may itself be wrong, relative to full signal."""
+    """Rms error of the reference itself, relative to full signal."""
     tolerance: float | None = None
     """What its error may be, relative to full signal; None where no promise is made of it."""
 

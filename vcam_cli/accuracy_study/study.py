@@ -84,8 +84,8 @@ class Study:
                 "tolerance_spent is the error over the tolerance, where a setting promises one.",
                 "mean_s_cielab is between renders without noise; with noise for skipped effects and"
                 " for shot_noise.",
-                "Noise and rounding change no mean: their contribution is a share of the variance"
-                " at the 1st to 99th percentile of the scene's own signal, the largest of them.",
+                "Noise and rounding do not change the mean: their contribution is the largest share"
+                " of the variance at the 1st to 99th percentile of the signal.",
                 "An effect is skipped with everything else on.",
             ],
         }

@@ -69,7 +69,7 @@ MERGE_RULES = MergeRules(
 
 
 class Camera(CameraModel):
-    """A camera that looks at a scene: everything that a run depends on."""
+    """A camera before a scene: all inputs of a run."""
 
     @own_float_errors
     def with_(self, changes: Mapping[str, Any]) -> "Camera":

@@ -25,14 +25,14 @@ from vcam_cli.config.yaml_type import to_yaml
 
 
 class AutoExposure(Model):
-    """Time, then gain, that bring a chosen level to a fraction of saturation."""
+    """Automatic exposure: time, then gain, that bring a level to a fraction of saturation."""
 
     max: Time = key("longest time", example="100 ms", default=0.1)
     min: Annotated[float, Quantity("time", least=0, most=1e9)] = key(
         "shortest time", unit="ms", example="0 s", default=0.0
     )
     max_gain: Positive = key(
-        "largest gain, where the longest time is not enough; the gain itself by default",
+        "largest gain, used where the longest time does not suffice; default: the gain itself",
         default=1.0,
     )
     max_iso: MaybePositive = key(
@@ -41,17 +41,19 @@ class AutoExposure(Model):
         default=None,
     )
     method: Literal["white", "percentile", "mean"] = key(
-        "the level: the perfect white's, a percentile of the picture, or its mean", default="white"
+        "metered level: of the perfect white, a percentile of the picture, or its mean",
+        default="white",
     )
     target: Annotated[float, Number(above=0, most=1, example="0.9")] = key(
-        "fraction of the full well, or of the ADC where that is full first", default=0.9
+        "fraction of saturation: of the full well, or of the ADC where it saturates first",
+        default=0.9,
     )
     percentile: Annotated[float, Number(least=0, most=100, example="99.9")] = key(
-        "which percentile, for that method", default=99.9
+        "percentile of the picture, for `method: percentile`", default=99.9
     )
     follow: Annotated[float, Number(above=0, most=1, example="0.5")] = key(
-        "of sequences: part of the way, in EV, that a frame's exposure goes toward what the frame"
-        " before would have needed; 1: all of it",
+        "in sequences: fraction of the last frame's exposure error, in EV, that the next frame "
+        "corrects; 1: all of it",
         default=0.5,
     )
 
@@ -65,32 +67,32 @@ class AutoExposure(Model):
 
 
 class RollingShutter(Model):
-    """Lines that are exposed one after the other, each as long as all others."""
+    """Lines exposed in sequence, each for the exposure time."""
 
     line_time: Annotated[float, Quantity("time", least=0, most=1e3)] = key(
-        "from the start of one line to that of the next", unit="us", example="15 us"
+        "delay between the starts of successive lines", unit="us", example="15 us"
     )
     direction: Literal["down", "up", "right", "left"] = key(
-        "where the lines go in the picture as it is seen: down begins with the top row, right with"
-        " the leftmost column",
+        "readout direction in the displayed picture: down begins with the top row, right with "
+        "the leftmost column",
         default="down",
     )
 
 
 class Rolling(Model):
-    """A shutter that rolls."""
+    """A rolling shutter."""
 
-    rolling: RollingShutter = key("lines one after the other", example={"line_time": "15 us"})
+    rolling: RollingShutter = key("rolling shutter, line by line", example={"line_time": "15 us"})
 
 
 class CaptureSchedule(Model):
     """Capture times chosen by the camera for its scene."""
 
-    schedule: Literal["optimal"] = key("how they are chosen", example="optimal")
+    schedule: Literal["optimal"] = key("criterion of the schedule", example="optimal")
     count: Annotated[int, Whole(least=1, most=1000, example="8")] = key(
         "number of captures", example=8
     )
-    max: Time = key("the longest time a capture may have", example="100 ms")
+    max: Time = key("longest capture time", example="100 ms")
 
 
 def _captures(given: Any) -> Any:
@@ -139,7 +141,7 @@ class Exposure(Model):
         "automatic exposure", example={"max": "100 ms", "method": "white"}, default=None
     )
     gain: MaybePositive = key(
-        "analog gain before the ADC, which is then full at 1 / gain of the electrons; default 1",
+        "analog gain before the ADC, which saturates at 1 / gain of the electrons; default 1",
         example=1,
         default=None,
     )
@@ -149,22 +151,24 @@ class Exposure(Model):
         default=None,
     )
     compensation: Annotated[float, Quantity("exposure_value", least=-20, most=20)] = key(
-        "of auto: the level is brought to target x 2^compensation", example="0 EV", default=0.0
+        "exposure compensation of auto: the level is brought to target x 2^compensation",
+        example="0 EV",
+        default=0.0,
     )
     shutter: Annotated[Literal["global"] | Rolling, word_or(Rolling, {"global": "global"})] = key(
-        "global: all pixels are exposed together; or {rolling: {line_time: 15 us, direction:"
-        " down}}: line after line",
+        "global: all pixels are exposed at once; or {rolling: {line_time: 15 us, direction: "
+        "down}}: line by line",
         default="global",
     )
     start: Annotated[float, Quantity("time", least=0, most=1e9)] = key(
-        "when the exposure begins, for what changes with time: flicker and motion",
+        "start of the exposure, for flicker and motion",
         unit="ms",
         example="0 s",
         default=0.0,
     )
     reference: Annotated[float | None, Quantity("time", least=0, most=1e9)] = key(
-        "when what moves is where its file says; default the middle of the exposure of the array's"
-        " middle, of an exposure that starts at 0 s",
+        "time at which moving objects are at the position in the file; default the middle of "
+        "the exposure of the array's center, for an exposure that starts at 0 s",
         unit="ms",
         example="5 ms",
         default=None,
@@ -186,20 +190,20 @@ class Exposure(Model):
         tuple[float, ...],
         Either(_bracket, list[Annotated[float, TIME]], yaml_form=lambda v: times_to_yaml(v)),
     ] = key(
-        "exposures one after the other without a pause, each with noise of its own; merged to"
-        " hdr.exr, raw.exr is the longest",
+        "consecutive exposures without a pause, with independent noise; merged to hdr.exr, "
+        "raw.exr is the longest",
         unit="ms",
         example=["10 ms", "1 ms", "0.1 ms"],
         default=(),
     )
     merge: Literal["snr", "switch"] = key(
-        "how the exposures of a bracket become one: by inverse variance of those that do not"
-        " saturate, or the longest of them",
+        "merging of bracketed exposures: by inverse variance of the unsaturated ones, or the "
+        "longest unsaturated one",
         default="snr",
     )
     estimator: Literal["lsbs", "weighted"] = key(
-        "how captures become one picture: the last sample before saturation, or the optimal "
-        "weighted mean",
+        "estimator of the picture from its captures: the last sample before saturation, or the "
+        "optimal weighted mean",
         default="lsbs",
     )
 
@@ -215,7 +219,7 @@ class Exposure(Model):
     @model_validator(mode="after")
     def _check_automatic(self) -> Self:
         if self.merge == "switch" and not self.bracket:
-            message = "there is one exposure, and nothing to merge"
+            message = "needs several exposures; this camera has one"
             raise refusal(("merge",), message, "add bracket: [10 ms, 1 ms], or remove merge")
         if self.auto is None and self.compensation:
             message = "only an automatic exposure is compensated"
@@ -229,7 +233,7 @@ class Exposure(Model):
         return self
 
     def exposures(self) -> tuple["Exposure", ...]:
-        """Return the exposures of a bracket in the order of time; () where there is none."""
+        """Return the exposures of a bracket in the order of time; () without a bracket."""
         begins = accumulate(self.bracket, initial=self.start)
         return tuple(
             self.single(time).with_derived(start=begin)

@@ -329,14 +329,14 @@ SWITCHES = {
 }
 """A word for a switch -> what it means."""
 NOT_SIMULATED: Mapping[str, str] = {
-    "smear": "charge is transferred in no time, and collects no light meanwhile",
-    "flash": "the light of the scene is scene.illuminant at one level",
+    "smear": "charge transfer is instantaneous",
+    "flash": "scene.illuminant has one level throughout the exposure",
     **dict.fromkeys(
         ("stabilization", "image_stabilization", "optical_stabilization"),
-        "the camera moves as scene.camera_motion says",
+        "write the residual motion as scene.camera_motion",
     ),
 }
-"""What cameras have and this file cannot say -> what is simulated in its place."""
+"""Features of cameras without a key of their own -> the nearest model."""
 PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".hdr", ".bmp", ".webp", ".pfm"}
 """Ends of names of files of pictures."""
 DATA = PICTURES | {".csv", ".txt", ".dat", ".npy", ".tsv"}

@@ -16,7 +16,7 @@ class NoLens(Optics):
 
     @property
     def is_lens(self) -> bool:
-        """Whether there is a lens: there is none."""
+        """False: this camera has no lens."""
         return False
 
 

@@ -93,8 +93,7 @@ def one_projection(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
     if is_fisheye and projection not in ("rectilinear", "equidistant"):
         yield fault(
             ("projection",),
-            "contradicts distortion: {model: fisheye}, whose angles are equidistant but for its"
-            " coefficients",
+            "contradicts distortion: {model: fisheye}, whose projection is equidistant",
             "remove projection, or give the coefficients of the other model",
             projection,
         )

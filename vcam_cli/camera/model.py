@@ -53,11 +53,11 @@ class CameraModel(FileModel):
         default="camera",
     )
     scene: Scene = key(
-        "what stands in front of the lens",
+        "the scene before the lens",
         example={"source": {"kind": "chart", "chart": "colorchecker"}, "luminance": "100 cd/m2"},
     )
     optics: Annotated[Optics, OPTICS] = key(
-        "the lens; or none: the scene's light falls on the bare sensor, along its normal",
+        "the lens; none: light reaches the bare sensor at normal incidence",
         example={"f_number": 2.8, "focal_length": "3.2 mm"},
     )
     pixel: Pixel = key("one pixel", example={"width": "6.5 um"})
@@ -73,15 +73,15 @@ class CameraModel(FileModel):
         "metrics of the picture against the ideal image", example=["mse", "psnr"], default=()
     )
     expect: Annotated[tuple[str, ...], LIMIT_LIST] = key(
-        "limits that metrics of the run keep; where one is missed, vcam run exits with 4",
+        "limits of the run's metrics; vcam run exits with 4 where one is violated",
         example=["mean_electrons >= 1000", "gray_snr_db >= 30"],
         default=(),
     )
     display: Display = key(
-        "the display on which pictures are compared", example={"dpi": 72}, default=Display
+        "the display for perceptual metrics", example={"dpi": 72}, default=Display
     )
     effects: Effects = key(
-        "auto, all, or a mapping of effects to auto, on or off; unnamed ones stay auto",
+        "auto, all, or a mapping of effects to auto, on or off; others stay auto",
         default="auto",
     )
     accuracy: Annotated[Accuracy, ACCURACY] = key(
@@ -90,7 +90,7 @@ class CameraModel(FileModel):
         default=Accuracy,
     )
     seed: Seed = key("seeds of the random numbers", example={"frame": 1}, default=Seed)
-    output: Output = key("what is written", example={"raw": ["dn"]}, default=Output)
+    output: Output = key("output files", example={"raw": ["dn"]}, default=Output)
 
     _samples: tuple[tuple[str, Any], ...] = PrivateAttr(default=())
     _exposure_gain: float | None = PrivateAttr(default=None)
@@ -194,11 +194,11 @@ class CameraModel(FileModel):
                 yield fault(("pixel", "blooming"), message, f"{remedy}, or blooming: 0 %")
 
     def _phase_mistakes(self) -> Iterator[InitErrorDetails]:
-        """Yield why halves of the lens cannot be told apart."""
+        """Yield why halves of the lens cannot be distinguished."""
         given, array, readout = self.pixel.phase_detection, self.array, self.pixel.readout
         if given is None:
             if self.output.phase:
-                message = "there are no pixels that see one half of the lens"
+                message = "needs phase-detection pixels (pixel.phase_detection)"
                 yield fault(("output", "phase"), message, "add pixel.phase_detection: dual")
             return
         scattered = array.is_scattered or array.pattern == "stacked"

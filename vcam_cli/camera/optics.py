@@ -42,7 +42,7 @@ class FocusWindow(Model):
     x: Fraction = key("its center from the left edge, of the picture's width", default=0.5)
     y: Fraction = key("its center from the upper edge, of the picture's height", default=0.5)
     width: Annotated[float, Number(above=0, most=1)] = key(
-        "its width, of the picture's; what lies outside is left away", default=0.5
+        "its width, as a fraction of the picture's; clipped to the picture", default=0.5
     )
     height: Annotated[float, Number(above=0, most=1)] = key("the same of its height", default=0.5)
 
@@ -81,16 +81,16 @@ class Psf(Model):
     """A point spread function, measured or from a lens program."""
 
     file: File = key(
-        "the point spread function in linear light: an EXR or TIFF image, an NPY file, or a text "
-        "grid as lens programs write it; the middle of the grid is the ideal image point",
+        "point spread function in linear light: an EXR or TIFF image, an NPY file, or a text "
+        "grid from a lens program; the middle of the grid is the ideal image point",
         example="psf.exr",
     )
-    pitch: Length = key("distance of its samples on the sensor", example="0.5 um")
+    pitch: Length = key("sample spacing on the sensor", example="0.5 um")
     wavelength: MaybeLength = key(
-        "the wavelength it was taken at; it is used for all", example="550 nm", default=None
+        "wavelength of the measurement; applied to all wavelengths", example="550 nm", default=None
     )
     wavelengths: tuple[Length, ...] = key(
-        "the wavelengths of its channels, in the file's order; straight in between",
+        "wavelengths of its channels, in the file's order; interpolated linearly",
         unit="nm",
         example=["450 nm", "550 nm"],
         default=(),
@@ -100,17 +100,17 @@ class Psf(Model):
 
 
 class MtfFile(Model):
-    """Modulation transfer of the lens, measured or from a lens program."""
+    """MTF of the lens, measured or from a lens program."""
 
     file: File = key(
-        "CSV file with the columns frequency_lp_per_mm,value, and wavelength_nm or "
-        "image_height_mm where it has them; straight in between",
+        "CSV file with the columns frequency_lp_per_mm,value, and optional wavelength_nm or "
+        "image_height_mm; interpolated linearly",
         example="mtf.csv",
     )
 
 
 class GivenGlass(Model):
-    """A glass of which nd and Vd are known: n = A + B / l + C / l^3.5, on the normal line."""
+    """A glass given by nd and Vd: n = A + B / l + C / l^3.5, on the normal line."""
 
     nd: Annotated[float, Number(above=1, below=5)] = key("index at 587.6 nm", example=1.5168)
     vd: Annotated[float, Number(least=5, most=150)] = key(
@@ -131,13 +131,13 @@ def _glasses(given: Any) -> tuple[tuple[str, GivenGlass], ...]:
 
 
 class Prescription(Model):
-    """A lens by its surfaces and glasses, traced."""
+    """A ray-traced lens, by its surfaces and glasses."""
 
     file: Annotated[str | None, FileName()] = key(
         "a .zmx file, or a YAML table of surfaces", example="lens.zmx", default=None
     )
     use: Annotated[str | None, FileName()] = key(
-        "a lens that ships (vcam list lenses)", example="double-gauss", default=None
+        "a shipped lens (vcam list lenses)", example="double-gauss", default=None
     )
     scale: Annotated[float, Number(above=0, least=1e-4, most=1e4)] = key(
         "factor on all its lengths; its f-number stays", example=0.1, default=1.0
@@ -146,8 +146,8 @@ class Prescription(Model):
         key("f-number that its stop is set to; default the file's", example=4, default=None)
     )
     image_plane: Literal["best", "file"] = key(
-        "best: where the wavefront on the axis is flattest; file: as far behind the lens as the"
-        " file has it, moved by the paraxial change for focus_distance",
+        "best: least rms wavefront error on the axis; file: distance behind the lens from the "
+        "file, plus the paraxial shift for focus_distance",
         default="best",
     )
     glasses: Annotated[
@@ -158,7 +158,7 @@ class Prescription(Model):
             yaml_form=lambda given: to_yaml(dict(given)) or None,
         ),
     ] = key(
-        "glasses that the catalog does not have, by name",
+        "glasses missing from the catalog, by name",
         example={"NBFD5": {"nd": 1.7859, "vd": 44.2}},
         default=(),
     )
@@ -264,13 +264,13 @@ _GROUPS = (
 
 
 def _is_determined(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
-    """Require two of focal length, f-number and aperture, or of what may stand for them."""
+    """Require two of focal length, f-number and aperture, or of the keys that replace them."""
     known = [group for group in _GROUPS if any(name in given for name in group)]
     if len(known) < 2 and not _is_traced(given):
         yield fault(
             (),
             "the lens is not determined: two of f_number, focal_length and aperture_diameter are "
-            "needed (field_of_view may stand for focal_length, numerical_aperture for f_number)",
+            "needed (field_of_view may replace focal_length, numerical_aperture f_number)",
             "add for example focal_length: 3.2 mm" if known else "add f_number and focal_length",
         )
 
@@ -286,12 +286,12 @@ def _traced_alone(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
         return
     for name in (*(n for group in _GROUPS for n in group), "exit_pupil_distance"):
         if given.get(name) not in (None, "auto"):
-            message = "cannot be given beside prescription, from which it follows"
+            message = "cannot be combined with prescription, which determines it"
             remedy = f"remove {name}; prescription: {{use: NAME, scale: 0.1, f_number: 4}} sets it"
             yield fault((name,), message, remedy, given[name])
     for name in ("zernike", "psf", "mtf", "distortion", "lateral_color", "focus_shift"):
         if given.get(name) not in (None, "none") and not _neutral(name, given[name]):
-            message = "cannot be given beside prescription, from which it follows"
+            message = "cannot be combined with prescription, which determines it"
             yield fault((name,), message, f"remove {name}", given[name])
 
 
@@ -378,13 +378,13 @@ class Optics(Model):
     field_of_view: Annotated[
         FieldOfView | None, Either(_field_of_view, str | FieldOfView, yaml_form=_written_field)
     ] = key(
-        "full angle over the array's diagonal, or {horizontal: 90 deg}; may stand for focal_length",
+        "full angle over the array's diagonal, or {horizontal: 90 deg}; may replace focal_length",
         unit="deg",
         example="46 deg",
         default=None,
     )
     numerical_aperture: Annotated[float | None, Number(above=0, below=1, example="0.18")] = key(
-        "on the image side; may stand for f_number", example=0.18, default=None
+        "on the image side; may replace f_number", example=0.18, default=None
     )
     transmittance: Annotated[SpectrumSpec, Spectral(most=1.0)] = key(
         "of lens and filters in front of the sensor: a spectrum", example=0.95, default=flat(0.95)
@@ -408,14 +408,14 @@ class Optics(Model):
         default=None,
     )
     focus_distance: Annotated[float | None, Quantity("distance", above=0)] = key(
-        "from the lens to what it is focused on, or infinity; default scene.distance",
+        "focused object distance from the lens, or infinity; default scene.distance",
         example="1 m",
         default=None,
     )
     diffraction: Switch = key("whether the aperture diffracts", default=True)
     focus: Literal["fixed", "auto"] = key(
-        "auto: by contrast, the image plane is moved to where focus_window is sharpest, whatever"
-        " defocus says, with nothing in motion; 18 trials at most, counted in the plan's time",
+        "auto: contrast autofocus moves the image plane to the sharpest focus_window, in place "
+        "of defocus, without motion; 18 trials at most, included in the plan's time",
         default="fixed",
     )
     focus_window: Annotated[FocusWindow, mapping(FocusWindow)] = key(
@@ -432,8 +432,8 @@ class Optics(Model):
         WavelengthTable | None,
         ByWavelength(Quantity("length"), example="{table: {450: 12 um, 650: -8 um}}"),
     ] = key(
-        "longitudinal color: shift of the image plane by wavelength, as defocus is one of all; "
-        "straight in between, the nearest beyond",
+        "longitudinal color: shift of the image plane by wavelength, added to defocus; "
+        "interpolated linearly, end values beyond",
         unit="um",
         example={"table": {"450": "12 um", "650": "-8 um"}},
         default=None,
@@ -445,8 +445,8 @@ class Optics(Model):
             example="{table: {450: -0.02 %, 650: 0.03 %}}",
         ),
     ] = key(
-        "lateral color: change of magnification by wavelength; straight in between, the nearest "
-        "beyond",
+        "lateral color: change of magnification by wavelength; interpolated linearly, end "
+        "values beyond",
         unit="%",
         example={"table": {"450": "-0.02 %", "650": "0.03 %"}},
         default=None,
@@ -460,15 +460,14 @@ class Optics(Model):
         default="rectilinear",
     )
     distortion: Annotated[AnyDistortion | None, DISTORTION] = key(
-        "where the lens images a direction, beside its projection: OpenCV's coefficients, those of "
-        "its fisheye model, or a table; the center of the array is the axis",
+        "distortion relative to the projection: OpenCV's coefficients, those of its fisheye "
+        "model, or a table; the axis meets the center of the array",
         example={"k1": -0.1},
         default=None,
     )
     zernike: Annotated[Wavefront, Zernike()] = key(
-        "wavefront by Noll index; or a list of {field: 0.7, ...} (0 center, 1 corner): what it is "
-        "to the right of the center, straight in between; the lens is symmetric about its axis, so "
-        "elsewhere it is turned",
+        "wavefront by Noll index; or a list of {field: 0.7, ...} (0 center, 1 corner) to the "
+        "right of the center, interpolated linearly; rotated about the axis elsewhere",
         unit="um",
         example={"4": "0.05 um", "8": "0.1 um"},
         default=Wavefront(),
@@ -479,8 +478,8 @@ class Optics(Model):
         default=None,
     )
     mtf: Annotated[MtfFile | None, word_or(MtfFile, {"none": None})] = key(
-        "a measured modulation transfer in place of aberrations and diffraction; where it ends "
-        "above 0 it goes on like diffraction",
+        "a measured MTF in place of aberrations and diffraction; an MTF that ends above 0 is "
+        "extrapolated by the diffraction-limited MTF",
         example="none",
         default=None,
     )
@@ -498,9 +497,7 @@ class Optics(Model):
         example="double-gauss",
         default=None,
     )
-    stray_light: Fraction = key(
-        "fraction of the mean irradiance that is spread evenly", default=0.0
-    )
+    stray_light: Fraction = key("fraction of the mean irradiance added uniformly", default=0.0)
 
     rules: ClassVar[tuple[Rule, ...]] = (
         _is_determined,

@@ -192,11 +192,11 @@ def light_mistakes(steps: Sequence[Step], emits: bool) -> Iterator[InitErrorDeta
 
 
 def code_mistakes(steps: Sequence[Step], render: int | None) -> Iterator[InitErrorDetails]:
-    """Yield why steps on codes cannot work on a render of so many bits, or None of no render."""
+    """Yield why steps on codes cannot work on a render of `render` bits; None: no render."""
     for i, step in enumerate(steps):
         path = ("processing", i, step.name)
         if acts_on(step) == "codes" and render is None:
-            message = f"{step.name} acts on the render, and none is asked for"
+            message = f"{step.name} acts on the render, and no render is written"
             yield fault(path, message, "write output: {render: 8}", to_yaml(step))
         elif step.name == "jpeg" and render != 8:
             message = f"JPEG has 8 bits, this render {render}"

@@ -38,7 +38,7 @@ def _black_level(given: Any) -> Any:
 
 
 class BlackLevel(Step):
-    """What is subtracted from the raw numbers."""
+    """Black level subtracted from raw codes."""
 
     black_level: Annotated[
         float | Literal["subtract", "none"],
@@ -54,7 +54,7 @@ class Demosaic(Step):
     """All colors at every pixel."""
 
     demosaic: Literal["bilinear", "edge-aware"] = key(
-        "how missing colors are found", example="bilinear"
+        "interpolation of the missing colors", example="bilinear"
     )
 
 
@@ -70,7 +70,7 @@ class WhiteBalance(Step):
     """A gain for each color. It may stand before demosaic or after it."""
 
     white_balance: Literal["gray-world", "bright-block", "illuminant", "none"] = key(
-        "how the gains are found", example="illuminant"
+        "estimation of the gains", example="illuminant"
     )
 
 
@@ -91,7 +91,7 @@ _FITS = {"fit": "fit", "primaries": "primaries", "none": "none"}
 
 
 class ColorCorrection(Step):
-    """From the camera's colors to the display's."""
+    """Transform from camera colors to display colors."""
 
     acts_on = "colors"
 
@@ -113,23 +113,22 @@ class Gamma(Step):
 
 
 class ToneMapping(Model):
-    """How bright the render is, and what becomes of its highlights."""
+    """Exposure and highlight compression of the render."""
 
     exposure: Annotated[float, Quantity("exposure_value", least=-20, most=20)] = key(
         "brightens the render by powers of two", example="0 EV", default=0.0
     )
     white: Literal["scene", "sensor"] = key(
-        "what is white in the render: a perfect white in the scene, or what saturates the sensor,"
-        " as cameras do",
+        "white of the render: a perfect white in the scene, or sensor saturation, as in cameras",
         default="scene",
     )
     curve: Literal["none", "filmic"] = key(
-        "none clips what is brighter than white, filmic rolls it off", default="none"
+        "none clips values above white, filmic compresses them", default="none"
     )
 
 
 class Tone(Step):
-    """Tone mapping of the render; metrics of the picture know nothing of it."""
+    """Tone mapping of the render; metrics ignore it."""
 
     tone: Annotated[ToneMapping, mapping(ToneMapping)] = key(
         "brightness and highlights of the render", example={"white": "sensor"}
@@ -137,32 +136,32 @@ class Tone(Step):
 
 
 class Noise(Model):
-    """How much of the noise is taken away."""
+    """Strength of the noise reduction."""
 
     strength: Annotated[float, Number(least=0, most=100, example="1")] = key(
-        "factor on the standard deviation that is taken for noise; 0 changes nothing", default=1.0
+        "factor on the estimated noise standard deviation; 0 changes nothing", default=1.0
     )
 
 
 class Denoise(Step):
-    """Less noise, by the adaptive Wiener filter of Lee (1980) over 5 x 5 pixels."""
+    """Noise reduction by the adaptive Wiener filter of Lee (1980) over 5 x 5 pixels."""
 
     acts_on = "colors"
 
     denoise: Annotated[Noise, mapping(Noise)] = key(
-        "smooths where the picture varies no more than its noise, which is measured in it",
+        "smooths where the local variance equals the noise, which is estimated from the picture",
         example={"strength": 1},
     )
 
 
 class UnsharpMask(Model):
-    """How wide and how strong an unsharp mask is."""
+    """Radius and amount of an unsharp mask."""
 
     radius: Annotated[float, Quantity("pixels", above=0, most=20)] = key(
         "standard deviation of the Gaussian blur", example="1 px", default=1.0
     )
     amount: Annotated[float, Number(least=0, most=20, example="0.5")] = key(
-        "what the difference from the blurred picture is multiplied by", default=0.5
+        "factor on the difference from the blurred picture", default=0.5
     )
 
 
@@ -182,26 +181,25 @@ class GamutMapping(Step):
     acts_on = "colors"
 
     gamut_mapping: Literal["desaturate", "none"] = key(
-        "desaturate: towards the gray of the same luminance, until no component is negative;"
-        " what is brighter than white is the matter of tone",
+        "desaturate: toward the gray of the same luminance, until no component is negative; "
+        "`tone` handles values above white",
         example="desaturate",
     )
 
 
 class LensDistortion(Step):
-    """Straight lines as straight lines again, by what optics.distortion and projection say."""
+    """Correction of the distortion of optics.distortion and projection."""
 
     acts_on = "colors"
 
     lens_distortion: Literal["correct", "none"] = key(
-        "correct: each pixel is taken from where the lens has imaged it, by cubic splines; the"
-        " picture is magnified until it has no empty rim",
+        "correct: resamples the picture by cubic splines, magnified until it has no empty rim",
         example="correct",
     )
 
 
 class Compression(Model):
-    """How strongly a picture is compressed."""
+    """Strength of the compression."""
 
     quality: Annotated[int, Whole(least=1, most=100, example="90")] = key(
         "of the quantization tables, 1 to 100, as libjpeg counts", default=90
@@ -214,7 +212,7 @@ class Jpeg(Step):
     acts_on = "codes"
 
     jpeg: Annotated[Compression, mapping(Compression)] = key(
-        "compresses the render: render.png shows what is left, render.jpg is the file itself;"
-        " metrics compare linear light and know nothing of it",
+        "compresses the render as JPEG: render.jpg is that file, render.png its decoded picture;"
+        " metrics compare linear light before compression",
         example={"quality": 90},
     )

@@ -36,7 +36,7 @@ METRICS_OF = {
     "cielab": "mean_delta_e",
     "s-cielab": "mean_s_cielab",
 }
-"""Entry of `quality` -> the metric that it asks for."""
+"""Entry of `quality` -> the metric that it requests."""
 NEEDS = {
     "mtf50": {"edge": "write scene.source: {kind: chart, chart: slanted-edge}"},
     "hdr_saturated_fraction": {"samples": "give exposure.captures or bracket"},
@@ -55,7 +55,7 @@ class Display(Model):
 
     dpi: MaybePositive = key("dots per inch; default 72", example=72.0, default=None)
     width: MaybeLength = key(
-        "in place of dpi: the picture is always shown that wide", example="7.11 in", default=None
+        "width of the shown picture, in place of dpi", example="7.11 in", default=None
     )
     viewing_distance: Length = key("from eye to display", example="18 in", default=0.4572)
     primaries: Literal["crt-brainard", "srgb"] = key(
@@ -66,7 +66,7 @@ class Display(Model):
         "luminance of its white", example="100 cd/m2", default=100.0
     )
     filters: Literal["zhang-wandell-1996", "isetcam", "continuous"] = key(
-        "how S-CIELAB reads the eye's filters; continuous is smooth in the size of pixels",
+        "variant of the eye's filters in S-CIELAB; continuous varies smoothly with the pixel size",
         example="continuous",
         default="zhang-wandell-1996",
     )

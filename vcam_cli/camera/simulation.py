@@ -15,32 +15,32 @@ EFFECTS = {
     "off_axis": "falloff of light away from the axis",
     "diffraction": "blur by the lens's aperture",
     "aberration": "blur by an imperfect lens",
-    "depth": "layers at their own distances, each with its own sharpness",
-    "distortion": "a lens that images directions elsewhere than a pinhole would",
-    "lateral_color": "a lens that magnifies by wavelength",
-    "stray_light": "light spread evenly over the sensor",
+    "depth": "defocus of depth layers",
+    "distortion": "geometric distortion by the lens",
+    "lateral_color": "lateral color: magnification by wavelength",
+    "stray_light": "veiling glare: light spread uniformly over the sensor",
     "motion": "blur and skew by motion of scene or camera",
     "jitter": "blur by fast random pointing",
     "pixel_aperture": "blur by the photodetector's area",
     "charge_diffusion": "blur by charge that diffuses in the silicon",
     "pixel_vignetting": "shading by the layers above the photodetector",
     "microlens": "a lens on every pixel",
-    "crosstalk": "light, charge and voltage that pixels give to their neighbors",
-    "flicker": "a lamp that is not equally bright at all times",
-    "dark_current": "electrons that heat makes",
-    "shot_noise": "light and dark current arrive one by one",
-    "reset_noise": "charge that the reset leaves uncertain",
-    "read_noise": "noise of the readout, its columns and rows",
-    "heavy_tailed_noise": "noise of the readout with large values more often than normal",
-    "correlated_row_noise": "noise of the rows that neighbors share: bands",
-    "telegraph_noise": "traps in some pixels, filled in some frames",
-    "fpn": "differences between pixels and between columns",
-    "fpn_shading": "slow differences over the array",
+    "crosstalk": "optical and electrical crosstalk and interpixel capacitance",
+    "flicker": "modulation of the lamp over time",
+    "dark_current": "thermally generated electrons",
+    "shot_noise": "Poisson noise of photo- and dark electrons",
+    "reset_noise": "thermal (kTC) noise of the reset",
+    "read_noise": "noise of the readout, columns and rows",
+    "heavy_tailed_noise": "read noise with heavier tails than normal",
+    "correlated_row_noise": "row noise correlated between neighbors: banding",
+    "telegraph_noise": "random telegraph noise of trapping sites",
+    "fpn": "offset and gain differences of pixels and columns",
+    "fpn_shading": "low-frequency offset and gain differences over the array",
     "blooming": "charge beyond the full well that spills along columns",
-    "saturation": "a pixel holds so many electrons",
+    "saturation": "a pixel clips at its full-well capacity",
     "adc_noise": "noise of the ADC, behind the gain",
-    "quantization": "the ADC's whole numbers",
-    "charge_transfer": "charge left behind in a ccd",
+    "quantization": "rounding to the ADC's codes",
+    "charge_transfer": "charge transfer inefficiency of a ccd",
 }
 """Name -> what it is."""
 PRESETS = {"draft": 0.02, "standard": 0.005, "reference": 0.0002}
@@ -54,7 +54,7 @@ _STATES: dict[str, Any] = {
 EffectStates = create_model(
     "EffectStates",
     __base__=Model,
-    __doc__="Which effects are simulated; those not named stay auto.",
+    __doc__="Effects to simulate; others stay auto",
     **_STATES,
 )
 
@@ -77,13 +77,13 @@ _TOLERANCE = Number(above=0, most=0.5, example="0.1 %")
 
 
 class Accuracy(Model):
-    """How exact the simulation is to be: a preset or a tolerance, and knobs that it sets."""
+    """Numerical accuracy: a preset or a tolerance, and the numerical settings that it implies."""
 
     preset: Annotated[str | None, Choice(*PRESETS)] = key(
         "draft (2 %), standard (0.5 %) or reference (0.02 %)", example="standard", default=None
     )
     tolerance: Annotated[float, _TOLERANCE] = key(
-        "in place of a preset: error allowed, relative to full signal",
+        "in place of a preset: allowed error, relative to full signal",
         example="0.1 %",
         default=None,
     )
@@ -97,25 +97,25 @@ class Accuracy(Model):
         "entries of a table of transfer over spatial frequency", example=4096, default=None
     )
     spectral_rank: Annotated[int | None, Whole(least=1, most=256, example="8")] = key(
-        "most mixtures that stand for the spectra of a scene", example=8, default=None
+        "largest number of spectral mixtures that represent a scene", example=8, default=None
     )
     vignetting_points: Annotated[int | None, Whole(least=3, most=129, example="17")] = key(
-        "places along each half of the array at which a pixel's tunnel is integrated",
+        "positions along each half of the array at which pixel vignetting is integrated",
         example=17,
         default=None,
     )
     field_zones: Annotated[int | None, Whole(least=2, most=65, example="9")] = key(
-        "places from center to corner at which a blur that changes over the field is known",
+        "field positions from center to corner at which a field-dependent PSF is computed",
         example=9,
         default=None,
     )
     sub_exposures: Annotated[int | None, Whole(least=1, most=2048, example="16")] = key(
-        "instants whose mean an exposure is, where no transfer function has all of its motion",
+        "instants averaged over the exposure, where a transfer function cannot describe the motion",
         example=16,
         default=None,
     )
     float_width: Annotated[int | None, Choice(32, 64)] = key(
-        "bits of the numbers computed with", example=32, default=None
+        "bits of the floating-point numbers", example=32, default=None
     )
     shot_noise: Annotated[str | None, Choice("exact", "gaussian")] = key(
         "exact: Poisson; gaussian: a normal distribution of the same variance",
@@ -170,10 +170,10 @@ _SEED = Whole(least=0, most=2**63 - 1, example="1")
 
 
 class Seed(Model):
-    """What the random numbers depend on."""
+    """Seeds of the random numbers."""
 
-    sensor: Annotated[int, _SEED] = key("which sensor: fixed-pattern noise and defects", default=1)
-    frame: Annotated[int, _SEED] = key("which frame: temporal noise", default=1)
+    sensor: Annotated[int, _SEED] = key("sensor seed: fixed-pattern noise and defects", default=1)
+    frame: Annotated[int, _SEED] = key("frame seed: temporal noise", default=1)
 
 
 _CHANNELS = ("dn", "electrons", "volts")
@@ -197,8 +197,8 @@ class Irradiance(Model):
     """How the spectral irradiance on the sensor is sampled over wavelength."""
 
     sampling: Literal["band", "point"] = key(
-        "band: mean over the band of each channel, which falls straight to 0 at the neighboring"
-        " wavelengths; point: value at the channel's wavelength",
+        "band: mean over a triangular band that falls to 0 at the neighboring wavelengths; "
+        "point: value at the channel's wavelength",
         default="band",
     )
 
@@ -212,7 +212,7 @@ def _irradiance(given: Any) -> Any:
 
 
 class Output(Model):
-    """What a run writes beside run.json and metrics.csv."""
+    """Output files of a run, in addition to run.json and metrics.csv."""
 
     raw: Annotated[tuple[str, ...], Either(_raw, list[Literal["dn", "electrons", "volts"]])] = key(
         "channels of raw.exr: dn, electrons, volts",
@@ -242,19 +242,19 @@ class Output(Model):
         default=False,
     )
     isetcam: Annotated[bool, Strict()] = key(
-        "also write scene.mat, irradiance.mat and volts.mat, with which ISETCam goes on: radiance"
-        " of the scene and irradiance on the sensor in photons, the sensor in volts; wavelengths"
-        " and sampling as those of irradiance",
+        "also write scene.mat, irradiance.mat and volts.mat for ISETCam: radiance of the scene "
+        "and irradiance on the sensor in photons, the sensor in volts; wavelengths and sampling"
+        " as those of irradiance",
         default=False,
     )
     steps: Annotated[bool, Strict()] = key(
-        "also write step_01_NAME.png and so on: the render as it would be, did `processing` end"
-        " after that step; linear before gamma",
+        "also write step_01_NAME.png and so on: the render after each step of `processing`; "
+        "linear before gamma",
         default=False,
     )
     phase: Annotated[bool, Strict()] = key(
-        "also write phase.exr, what halves of pixels (pixel.phase_detection) read, channels left"
-        " and right [DN], and disparity.png, by how many pixels the two differ",
+        "also write phase.exr, the codes of the half-pixels (pixel.phase_detection), channels "
+        "left and right [DN], and disparity.png, their disparity in pixels",
         default=False,
     )
     report: Annotated[bool, Strict()] = key(

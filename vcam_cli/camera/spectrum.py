@@ -36,8 +36,8 @@ NAME = r"^[A-Za-z0-9._-]{1,64}$"
 MOST_FACTORS = 64
 OUTSIDE = Choice("error", "zero", "hold")
 _BEYOND = (
-    "what holds beyond the table: an error, zero, or the end values; default an error, or what a "
-    "camera says in scene.wavelengths.outside"
+    "values beyond the table: an error, zero, or the end values; default "
+    "scene.wavelengths.outside of a camera, else an error"
 )
 _FORMS = (
     "0.95, a shipped name, {file: x.csv}, {table: {400: 0.1, 700: 0.3}}, {silicon: [0 um, 0.4 um]}"
@@ -114,12 +114,12 @@ class CurveFile(Model):
         example="filter.csv",
     )
     column: Annotated[str | None, ColumnName()] = key(
-        "which column of values, by its name or number; needed where there are several",
+        "column of values, by name or number; needed where the file has several",
         example="R",
         default=None,
     )
     unit: Annotated[str | None, Choice("nm", "um")] = key(
-        "unit of the wavelengths; default what the header says, or their size tells",
+        "unit of the wavelengths; default: from the header, or else from their size",
         example="nm",
         default=None,
     )
@@ -141,7 +141,7 @@ class CurveTable(Model):
     """A curve written out."""
 
     table: Annotated[Points, PointTable()] = key(
-        "wavelength in nm -> value, straight lines between", unit="nm", example={400: 0.1, 700: 0.3}
+        "wavelength in nm -> value, interpolated linearly", unit="nm", example={400: 0.1, 700: 0.3}
     )
     outside: Annotated[Outside | None, OUTSIDE] = key(_BEYOND, example="hold", default=None)
 
@@ -173,7 +173,7 @@ class SpectrumFile(CurveFile):
 
     @property
     def is_per_watt(self) -> bool:
-        """Whether values are per watt of light; of a file that cannot be read, as far as stated."""
+        """Whether values are per watt of light; for an unreadable file, its `per`."""
         if self.per is not None:
             return self.per == "watt"
         try:
@@ -183,7 +183,7 @@ class SpectrumFile(CurveFile):
 
 
 class SpectrumTable(CurveTable):
-    """A spectrum written out."""
+    """A spectrum as a table."""
 
     per: Per = _PER
 
@@ -194,7 +194,7 @@ class SpectrumTable(CurveTable):
 
 
 class SiliconLayer(Model):
-    """What a layer of silicon collects: a filter of silicon.
+    """Absorption in a layer of silicon, as in a stacked pixel.
 
     Two depths: all that is absorbed between them. Four: a junction in a stack, as eq 2.30 has it:
     all between the middle two, where it is depleted; above and below a share that falls straight to
@@ -347,7 +347,7 @@ def _balance(table: spectra.Table, together: tuple[Factor, ...], outside: Outsid
     for factor in together:
         if isinstance(factor, float | SiliconLayer):
             continue
-        with contextlib.suppress(BadInput):  # which is told where it stands
+        with contextlib.suppress(BadInput):  # which is reported at its own key
             peer = _opened(factor, ())
             if not isinstance(peer, SiliconLayer) and peer.is_per_watt:
                 tables.append(peer.read_table((), outside))

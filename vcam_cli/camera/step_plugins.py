@@ -28,7 +28,7 @@ GROUP = "vcam.processing"
 
 
 MOST_HALO = 1000
-"""The largest `halo` [pixels]: blocks of rows take memory for so many more on every side."""
+"""The largest `halo` [pixels]: blocks of rows are padded by it on every side."""
 
 
 class PluginStep(Step):
@@ -63,7 +63,7 @@ class PluginStep(Step):
 def registered() -> dict[str, EntryPoint]:
     """Return the entry points of installed packages, by the name of their step.
 
-    Every frame of a sweep asks for them; they are read again where a folder that Python looks into
+    Every frame of a sweep needs them; they are read again where a folder that Python looks into
     has changed, as it has when a package was installed.
     """
     folders = []
@@ -113,7 +113,7 @@ def plugin(name: str) -> type[PluginStep] | None:
 
 
 def checked_halo(step: PluginStep) -> int:
-    """Return the halo of a step [pixels]. Raises ValueError for what is none, in words."""
+    """Return the halo of a step [pixels]. Raises ValueError for an invalid one."""
     halo = step.halo
     if isinstance(halo, bool) or not isinstance(halo, int) or not 0 <= halo <= MOST_HALO:
         raise ValueError(f"its halo is {halo!r}, not a whole number from 0 to {MOST_HALO} pixels")

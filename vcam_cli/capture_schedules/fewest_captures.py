@@ -22,7 +22,7 @@ class FewestCaptures:
     count : int or None
         The fewest captures that reach it; None where none that were tried do.
     gain : float or None
-        Gain of so many captures; without a count that of the largest number tried, None if none
+        Gain of these captures; without a count that of the largest number tried, None if none
         was.
     possible : bool
         Whether more captures than were tried may reach it.

@@ -138,7 +138,7 @@ def take_frames(
     Parameters
     ----------
     asked : ScheduleFrames
-        What the study asks for.
+        Requests of the study.
     camera : Camera
         The camera that takes them.
     workers : int, optional
@@ -180,7 +180,7 @@ def check_camera(camera: Camera) -> None:
     """Raise BadInput for a camera that takes no captures."""
     if not camera.exposure.captures:
         remedy = "give that camera exposure: {captures: {schedule: optimal, count: 8, max: 100 ms}}"
-        raise bad("frames.camera", "takes a single sample of an exposure", remedy)
+        raise bad("frames.camera", "has a single sample per exposure", remedy)
     if camera.pixel.blooming:
         message = "has blooming, which these frames would ignore"
         raise bad("frames.camera", message, "remove pixel.blooming there")
@@ -202,7 +202,7 @@ def write_frames(
     frames : Frames
         The pictures.
     asked : ScheduleFrames
-        What the study asks for.
+        Requests of the study.
     folder : OutputFolder
         The study's folder.
     name : str

@@ -110,7 +110,7 @@ def plot_details(
 
 
 def plot_noise(path: Path | str, title: str, pictures: Sequence[Picture], limit: float) -> None:
-    """Plot noise images, gray where there is none, above their histograms on one scale.
+    """Plot noise images, gray where undefined, above their histograms on one scale.
 
     Parameters
     ----------

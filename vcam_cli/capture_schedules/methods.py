@@ -65,7 +65,7 @@ class MethodResult:
 
     @property
     def count(self) -> int:
-        """Number of captures that was asked for."""
+        """Requested number of captures."""
         return len(self.schedule.times)
 
     @property

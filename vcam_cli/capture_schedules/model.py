@@ -94,7 +94,7 @@ def _or_null(read: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 
 class ScheduleSensor(Model):
-    """What a pixel holds, and its noise: equation 4.1."""
+    """Full well and noise of a pixel: equation 4.1."""
 
     well_capacity: Annotated[float, Quantity("charge", above=0)] = key(
         "of a pixel", unit="e", example="20000 e"
@@ -110,7 +110,7 @@ class ScheduleSensor(Model):
 
 
 class ScheduleConstraints(Model):
-    """What the readout demands of capture times."""
+    """Constraints of the readout on capture times."""
 
     min_gap: Annotated[float, Quantity("time", least=0)] = key(
         "least time between two captures", unit="ms", example="1 ms", default=0.0
@@ -152,7 +152,7 @@ def _name_mistakes(name: Any) -> Iterator[InitErrorDetails]:
 
 
 class Zoom(Model):
-    """A square of the picture that is shown larger."""
+    """Enlarged square of the picture."""
 
     x: Fraction = key("its center from the left, over the picture's width", example=0.5)
     y: Fraction = key("its center from the top, over the picture's height", example=0.5)
@@ -174,7 +174,7 @@ class ScheduleFrames(Model):
         "longest exposure; default the camera's", unit="ms", example="100 ms", default=None
     )
     methods: Annotated[tuple[str, ...], words_of(FRAME_METHODS, 0)] = key(
-        "how times are found",
+        "methods that choose the capture times",
         example=["uniform", "optimal", "heuristic"],
         default=FRAME_METHODS[:3],
     )
@@ -187,7 +187,9 @@ class ScheduleFrames(Model):
         ),
     ] = key("name -> times of your own", unit="ms", example=_TIMES_EXAMPLE, default=dict)
     estimators: Annotated[tuple[str, ...], words_of(FRAME_ESTIMATORS, 1)] = key(
-        "how captures become one picture", example=["lsbs", "weighted"], default=FRAME_ESTIMATORS
+        "estimator of the picture from its captures",
+        example=["lsbs", "weighted"],
+        default=FRAME_ESTIMATORS,
     )
     segments: Annotated[int, Whole(least=1, most=100_000, example="3")] = key(
         "of the pdf that the heuristic plans with", example=3, default=3
@@ -196,7 +198,7 @@ class ScheduleFrames(Model):
         "integrations over which the noise of every pixel is measured", example=16, default=16
     )
     zoom: Annotated[Zoom | None, mapping(Zoom)] = key(
-        "a square of the picture that is shown larger",
+        "enlarged square of the picture",
         example={"x": 0.5, "y": 0.5, "size": 0.2},
         default=None,
     )
@@ -218,13 +220,13 @@ class ScheduleStudy(Model):
         default="schedule",
     )
     pdf: PdfSource = key(
-        "how often which photocurrent occurs", example={"uniform": {"min": 0, "max": 1}}
+        "probability density of photocurrents", example={"uniform": {"min": 0, "max": 1}}
     )
     counts: Annotated[tuple[int, ...], Either(_COUNTS, list[Annotated[int, _COUNT]])] = key(
         "numbers of captures", example=[2, 4, 8]
     )
     methods: Annotated[tuple[str, ...], words_of(METHODS, 1)] = key(
-        "how schedules are found", example=["optimal", "uniform"], default=("optimal",)
+        "methods that compute schedules", example=["optimal", "uniform"], default=("optimal",)
     )
     segments: Annotated[
         tuple[int, ...],
@@ -236,8 +238,8 @@ class ScheduleStudy(Model):
             ),
         ),
     ] = key(
-        "approximate the pdf first, by iterative histogram binning; several: compared in "
-        "segments.csv, the largest is what the other tables are of",
+        "number of segments that approximate the pdf, by iterative histogram binning; several: "
+        "compared in segments.csv, other tables use the largest",
         example=3,
         default=(),
     )
@@ -249,8 +251,8 @@ class ScheduleStudy(Model):
             yaml_form=lambda value: list(value) if len(value) > 1 else value[0],
         ),
     ] = key(
-        "how the pdf is estimated from its pixels before segments approximate it; several: compared"
-        " in segments.csv, the first is what the other tables are of",
+        "estimator of the pdf from its pixels, before approximation by segments; several: "
+        "compared in segments.csv, other tables use the first",
         example="histogram",
         default=(HISTOGRAM,),
     )
@@ -263,7 +265,7 @@ class ScheduleStudy(Model):
         default=None,
     )
     constraints: ScheduleConstraints = key(
-        "what the readout demands of capture times",
+        "Constraints of the readout on capture times.",
         example={"min_gap": "1 ms"},
         default=ScheduleConstraints,
     )
@@ -276,8 +278,8 @@ class ScheduleStudy(Model):
     max_time_of: Annotated[
         int | None, Either(_or_null(_COUNT.read), _Null | Annotated[int, _COUNT])
     ] = key(
-        "longest exposure of all schedules: that of the optimal one of so many captures; default "
-        "none, and rules such as uniform end with the optimum of each number",
+        "longest exposure of all schedules: that of the optimal schedule with this number of "
+        "captures; default none: rules such as uniform end with the optimum of each number",
         example=10,
         default=None,
     )
@@ -305,25 +307,25 @@ class ScheduleStudy(Model):
         if self.sensor is None:
             give = "add for example sensor: {well_capacity: 20000 e}"
             if self.pdf.brightest is not None:
-                message = "changes nothing: without a sensor only ratios of photocurrents count"
+                message = "has no effect: without a sensor only ratios of photocurrents matter"
                 yield fault(("pdf", "brightest"), message, f"remove it, or {give}")
             for name, value in self.constraints:
                 if not value:
                     continue
-                message = "is a time, and without a sensor there is none"
+                message = "is a time and needs a sensor, without which times are relative"
                 yield fault(("constraints", name), message, give)
             if "weighted" in self.methods:
                 at = ("methods", self.methods.index("weighted"))
                 message = "weighted needs a sensor: with shot noise alone it is optimal"
                 yield fault(at, message, give)
             if self.online:
-                message = "online needs a sensor: what is believed while capturing depends on noise"
+                message = "online needs a sensor: estimates during capture depend on its noise"
                 yield fault(("online",), message, give)
         if self.density != (HISTOGRAM,) and not self.segments:
-            message = "changes nothing: the pdf is taken as it is"
+            message = "has no effect: the pdf is not approximated"
             yield fault(("density",), message, "add for example segments: 3")
         if self.starts > 1 and not set(RANDOM_STARTS) & set(self.methods):
-            message = "changes nothing: no method of the study has random starts"
+            message = "has no effect: no method of the study has random starts"
             yield fault(("starts",), message, "add the method sqp or sqp-assigned")
         if self.max_time_of is not None and self.sensor is not None and self.sensor.max_time:
             message = "is a longest exposure, and so is sensor.max_time"

@@ -32,7 +32,7 @@ from vcam_cli.scheduling.sensor import (
 )
 
 PIXELS = 1 << 16
-"""Photocurrents that stand for a scene, evenly by brightness."""
+"""Photocurrents that represent a scene, evenly by brightness."""
 RUNS = 4
 """Integrations with noise of their own, of which the losses are averaged."""
 MOST_ELECTRONS = 1e18
@@ -58,7 +58,7 @@ class OnlineLoss:
     start : {"known", "unknown"}
         Whether the first capture suits the brightest pixel, or has to be searched.
     replans : int
-        After so many captures of the plan the rest is taken as planned last.
+        After this many captures the rest follows the last plan.
     expected_snr : float
         Mean SNR of the chosen times over the true photocurrents, a power ratio.
     offline_snr : float
@@ -169,7 +169,7 @@ def online_losses(
     light = representative_photocurrents(scene)
     known = scene if isinstance(scene, Pdf) else photocurrent_levels(light)
     if known is None:
-        raise ValueError("no photocurrent is above 0: there is nothing to capture")
+        raise ValueError("no photocurrent is above 0")
     truth = known if isinstance(scene, Pdf) else Pdf.levels(light, np.ones(light.size))
     offline = full_noise.optimal_schedules(known, counts, sensor, constraints)
     first = first_capture_time(truth, sensor, constraints)
@@ -187,7 +187,7 @@ def online_losses(
 
 
 def representative_photocurrents(scene: Pdf | Floats) -> Floats:
-    """Return at most `PIXELS` photocurrents that stand for a scene, rising [e/s]."""
+    """Return at most `PIXELS` photocurrents that represent a scene, rising [e/s]."""
     quantiles = (np.arange(PIXELS) + 0.5) / PIXELS
     if not isinstance(scene, Pdf):
         values = np.sort(np.maximum(np.ravel(scene), 0).astype(np.float64))
@@ -338,4 +338,4 @@ def _panel(losses: Sequence[OnlineLoss], text: str) -> Panel:
         lines.append(Curve(f"{count} captures", x, y, "points", color % len(COLORS)))
         lines.append(Curve("", x, y, "line", color % len(COLORS)))
     label = f"loss against offline [dB], {text}"
-    return Panel("captures after which the rest is planned anew", label, lines)
+    return Panel("captures after which the rest is replanned", label, lines)

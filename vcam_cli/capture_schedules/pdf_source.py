@@ -76,7 +76,7 @@ class PdfUniform(Model):
 
 
 class PdfSegment(Model):
-    """A range of photocurrents that are equally likely."""
+    """A range of equally likely photocurrents."""
 
     min: Photocurrent = key("its lower end", example=0)
     max: Photocurrent = key("its upper end", example=0.3)
@@ -170,8 +170,8 @@ class PdfSource(Model):
         float | None,
         Either(_rate, Annotated[float, _RATE] | Annotated[float, _CURRENT], yaml_form=_RATE.text),
     ] = key(
-        "what the brightest photocurrent of the pdf is on the sensor, others in proportion: scales"
-        " a pdf of arbitrary units, such as the histogram of a picture; default as it stands, e/s",
+        "brightest photocurrent on the sensor: scales a pdf in arbitrary units, such as the "
+        "histogram of a picture; default unscaled, in e/s",
         unit="e/s",
         example="400 ke/s",
         default=None,

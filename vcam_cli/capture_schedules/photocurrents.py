@@ -102,7 +102,7 @@ class Approximation:
     Raises
     ------
     ValueError
-        If an estimator is asked for and the pdf counts no pixels.
+        If an estimator is requested and the pdf counts no pixels.
     """
 
     def __init__(self, pdf: Pdf, least: int, pixels: float = 0.0, density: str = HISTOGRAM) -> None:
@@ -128,7 +128,7 @@ class Approximation:
         return len(self._pdf.low) if self._few else len(self._histogram[1])
 
     def pdf(self, segments: int) -> Pdf:
-        """Return the pdf with at most so many segments, but with no fewer than at the end."""
+        """Return the pdf with at most `count` segments, and no fewer than the final number."""
         if self._few or (not self._pdf.discrete and len(self._pdf.low) <= segments):
             return self._pdf
         merges = self._merges[: max(0, self.original_segments - segments)]

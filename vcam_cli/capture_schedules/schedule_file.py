@@ -216,7 +216,7 @@ class _SourceReader:
         return node
 
     def read_frames_camera(self, over: Sequence[str], pdf_camera: Camera | None) -> Camera | None:
-        """Read the camera that takes the pictures, where any are asked for."""
+        """Read the camera that takes the pictures, where the study requests any."""
         frames = self.model.frames
         if frames is None or frames.camera is None:
             return None if frames is None else pdf_camera

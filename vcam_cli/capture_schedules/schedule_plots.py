@@ -190,9 +190,9 @@ def plot_binning(result: ScheduleResult, path: Path) -> None:
 
 
 def binning_steps(result: ScheduleResult) -> list[tuple[str, Pdf]]:
-    """Return the pdf on its way to the segments that are asked for, as names and pdfs.
+    """Return the steps from the pdf to the requested segments, as names and pdfs.
 
-    The original is the first; there is none where nothing is approximated.
+    The original is the first; empty without an approximation.
     """
     whole = result.approximation
     least = min(result.study.model.segments, default=0)

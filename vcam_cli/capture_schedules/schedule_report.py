@@ -11,7 +11,7 @@ CAPTIONS = {
     "schedule.csv": "The capture times of every method, relative to the first.",
     "summary.csv": "What schedules are worth. Gain: E[SNR] over that of a single capture; gap: how"
     " far, at most, the best schedule there can be lies above.",
-    "segments.csv": "What schedules are worth that are found on coarser pdfs.",
+    "segments.csv": "Gain of schedules computed on coarser pdfs.",
     "targets.csv": "The fewest captures that reach each gain.",
     "online.csv": "What planning capture by capture loses.",
     "charge.png": "Charge over time of a bright and a dark pixel, and the samples that count",
@@ -36,6 +36,6 @@ def write(result: ScheduleResult, folder: OutputFolder) -> None:
         for count, (method, gain) in best.items()
     ]
     facts += [("note", note) for note in result.notes]
-    about = "When to read a pixel that is read several times in one exposure."
+    about = "Capture times of one exposure with several readouts."
     title = f"{name}: capture times"
     study_report.write(folder, title, about, [Facts("In short", facts)], CAPTIONS)

@@ -19,7 +19,7 @@ from vcam_cli.scheduling.pdf import Pdf
 
 @dataclass(frozen=True)
 class ApproximationStep:
-    """A pdf approximated by so many segments, and the schedules found on it."""
+    """A pdf approximated by segments, and the schedules found on it."""
 
     density: str
     segments: int
@@ -40,17 +40,17 @@ class ScheduleResult:
     task : Task
         The pdf, the sensor and their bounds.
     approximation : Approximation or None
-        The pdf in fewer segments, where the study asks for it.
+        The pdf in fewer segments, where the study requests it.
     found : tuple of MethodResult
         Schedules of all methods and numbers of captures, in the study's order.
     steps : tuple of ApproximationStep
-        Schedules found on approximations, where the study asks for several.
+        Schedules found on approximations, where the study requests several.
     targets : tuple of FewestCaptures
         The fewest captures that reach each gain that the study names.
     online : tuple of OnlineLoss
-        What choosing times while capturing loses, where the study asks for it.
+        Loss of choosing times while capturing, where the study requests it.
     frames : Frames or None
-        Pictures taken with several schedules, where the study asks for them.
+        Pictures taken with several schedules, where the study requests them.
     notes : tuple of str
         What a user should know beside the numbers.
     seconds : float

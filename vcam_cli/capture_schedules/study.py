@@ -137,7 +137,7 @@ def _check_frames_camera(study: ScheduleFile) -> None:
 
 
 def _take_frames(study: ScheduleFile, workers: int | None, watch: Observer) -> Frames | None:
-    """Take the pictures that the study asks for."""
+    """Take the pictures that the study requests."""
     asked, camera = study.model.frames, study.frames_camera
     if asked is None or camera is None:
         return None
@@ -163,7 +163,7 @@ class _StudyRun:
         self.task = self._task(self.approximation.pdf(most) if self.approximation else None)
 
     def result(self, place: Path) -> ScheduleResult:
-        """Find the schedules and everything else that the study asks for."""
+        """Compute the schedules and all else that the study requests."""
         self.watch.begin("schedules")
         found = self._method_results(self.task, self.model.methods)
         return ScheduleResult(
@@ -230,7 +230,7 @@ class _StudyRun:
             )
             limits = self.model.constraints
             key = "min_gap" if limits.min_gap >= limits.frame_time else "frame_time"
-            remedy = f"ask for {most} at most, or make it smaller"
+            remedy = f"request {most} at most, or make it smaller"
             raise self.study.error(("constraints", key), message, remedy)
 
     def _check_assignments(self, task: Task) -> None:
@@ -241,7 +241,7 @@ class _StudyRun:
         if most > MOST_ASSIGNMENTS:
             message = f"sqp-assigned would search {most} assignments of captures to segments"
             path = ("methods", self.model.methods.index("sqp-assigned"))
-            remedy = f"ask for fewer captures, segments or starts: at most {MOST_ASSIGNMENTS}"
+            remedy = f"request fewer captures, segments or starts: at most {MOST_ASSIGNMENTS}"
             raise self.study.error(path, message, remedy)
 
     def _error(self, path: tuple[str, ...], error: ValueError) -> BadInput:

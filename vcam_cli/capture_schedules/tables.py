@@ -1,4 +1,4 @@
-"""What a schedule study writes: schedule.csv, summary.csv, tables it asks for, plots, and notes."""
+"""Files of a schedule study: schedule.csv, summary.csv, requested tables, plots, and notes."""
 
 from __future__ import annotations
 
@@ -148,6 +148,6 @@ def _saturation_notes(task: Task, found: Sequence[MethodResult]) -> Iterator[str
     )
     if loss > NOTED_LOSS:
         yield (
-            "captures stand exactly on levels, where noise fills one pixel in two: saturation "
+            "captures coincide with levels, where noise saturates one pixel in two: saturation "
             f"by noisy values takes up to {100 * loss:.2g} % off the E[SNR] of `optimal`"
         )

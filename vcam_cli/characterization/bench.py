@@ -9,7 +9,7 @@ Why not the camera's own array: pixels are alike, and how many there are decides
 statistics. A field of a fixed size measures a camera of one pixel as well as one of many millions.
 
 Why a pedestal: numbers end at 0, and an ADC without offset cuts off half of the noise in the dark.
-The standard asks for an offset that leaves at most 0.5 % of the pixels at 0; where the file's is
+The standard requires an offset that leaves at most 0.5 % of the pixels at 0; where the file's is
 lower, the codes are moved up as a whole, 0 and the highest code with them.
 
 References
@@ -243,7 +243,7 @@ def prepare_bench(camera: Camera, workers: int, stages: Stages) -> Bench:
     if camera.array.binning is not None and camera.array.binning.count > 1:
         raise bad(
             "array.binning",
-            "the bench measures pixels that are read one by one",
+            "the bench measures unbinned pixels",
             "write binning: none to measure the pixel",
         )
     pattern = camera.array.pattern
@@ -350,20 +350,20 @@ def _check_measurable(bench: Bench) -> None:
     if not bench.colors:
         raise bad(
             ("scene", "illuminant"),
-            "the pixels see nothing of this light",
+            "the pixels do not respond to this light",
             "choose another illuminant, or look at transmittance, filters and quantum efficiency",
         )
     if not any(e.name == "shot_noise" for e in ready.plan.active):
         raise bad(
             ("effects", "shot_noise"),
-            "the photon transfer measures the gain by the noise of light, which is switched off",
+            "photon transfer needs shot noise, which is switched off",
             "remove this line",
         )
     if bench.saturation <= 0.1 * ready.chain.saturation:
         raise bad(
             ("exposure",),
             f"dark current alone makes {bench.dark:.6g} of the {ready.chain.saturation:.6g}"
-            " electrons that a pixel or the ADC holds",
+            " electrons at saturation",
             "expose for a shorter time, or cool the sensor",
         )
     steps = math.sqrt(0.7 * bench.saturation) / ready.electrical.electrons_per_dn

@@ -152,9 +152,9 @@ def _of_readouts(
         for q in part.quantities
     )
     names = ", ".join(readout.name for readout in each)
-    told = [f"every readout is measured as if it were alone ({names}); plots show {each[0].name}"]
+    told = [f"every readout is measured separately ({names}); plots show {each[0].name}"]
     if camera.pixel.readout.small is not None:
-        told.append("small: photons are those that its photodiode gets of the light")
+        told.append("small: photons are those on its own photodiode")
     for readout, part in zip(each, parts, strict=True):
         told += [f"{readout.name}: {note}" for note in part.notes]
     merged = measure_merged_snr(camera, workers, stages)

@@ -118,7 +118,7 @@ def notes(bench: Bench, channels: tuple[Channel, ...]) -> Iterator[str]:
     """Yield what a reader of the numbers has to know."""
     blind = [color for color in bench.ready.mosaic.colors if color not in bench.colors]
     if blind:
-        yield f"{', '.join(blind)}: not measured, sees nothing of this light"
+        yield f"{', '.join(blind)}: not measured, does not respond to this light"
     if bench.pedestal:
         yield (
             f"the ADC's offset of {bench.ready.electrical.offset:g} DN cuts off noise in the dark;"
@@ -127,14 +127,14 @@ def notes(bench: Bench, channels: tuple[Channel, ...]) -> Iterator[str]:
     curve = bench.ready.electrical.curve
     if curve is not None:
         yield (
-            f"the transfer curve is off a line by at most {curve.nonlinearity:.2%} of its output:"
-            " gain and all counts in electrons are those that a linear camera would have"
+            "the transfer curve deviates from a straight line by at most"
+            f" {curve.nonlinearity:.2%} of its output: gain and electron counts are those of a"
+            " linear camera"
         )
     if any(c.transfer.series.dark_variance < MIN_DARK_VARIANCE for c in channels):
         yield (
-            "the noise in the dark is masked by the ADC's rounding: temporal_dark_noise and"
-            " read_noise are the most that they can be (EMVA 1288 R4 eq 54), dsnu holds rounding"
-            " as well"
+            "quantization masks the dark noise: temporal_dark_noise and read_noise are upper"
+            " limits (EMVA 1288 R4 eq 54), and dsnu includes quantization noise"
         )
 
 
@@ -205,7 +205,7 @@ def _range_rows(bench: Bench, channel: Channel) -> Iterator[Row]:
     floor, dark = bench.noise_floor, bench.dark
     capacity = saturation_capacity(chain.saturation, dark, floor, bench.pattern_variance)
     least = sensitivity_threshold(floor + dark + ROUNDING / chain.system_gain**2)
-    definition = "electrons that the well or the ADC holds, whichever is full first"
+    definition = "electrons at saturation of the well or the ADC, whichever is lower"
     yield "full_well", channel.full_well, chain.saturation, "e", definition
     definition = f"mu_e.sat, {R4} eq 24"
     yield "saturation_capacity", transfer.saturation_capacity, capacity, "e", definition

@@ -28,7 +28,7 @@ from vcam_cli.quality.photon_transfer import (
 )
 
 EVEN_LEVELS = 50
-"""Levels evenly spaced up to saturation: the least that EMVA 1288 asks for."""
+"""Levels evenly spaced up to saturation: the minimum of EMVA 1288."""
 FAINT_LEVELS = 10
 """Levels below them, for the curve of the signal-to-noise ratio."""
 SATURATION_LEVELS = 31
@@ -40,7 +40,7 @@ PAIRS = 4
 STACK = 64
 """Frames of a stack for the nonuniformity."""
 DARK_TIMES = 8
-"""Exposure times of dark frames; the standard asks for six."""
+"""Exposure times of dark frames; the standard requires six."""
 DARK_LEVEL = 0.2
 """Dark signal in the longest of them, over saturation."""
 EDGES = 128

@@ -29,7 +29,7 @@ class Keeper(Protocol):
     """What is shown the frames of flat fields as they are taken."""
 
     def add(self, bench: Bench, kind: Kind, electrons: float, time: float, frame: Array) -> None:
-        """Take a frame (rows, columns) [DN] of so many mean photo-electrons [e] and seconds."""
+        """Take a frame (rows, columns) [DN] of a mean signal [e] and an exposure time [s]."""
 
     def finish(self) -> None:
         """Take note that there are no more."""

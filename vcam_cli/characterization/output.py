@@ -72,13 +72,13 @@ def report_arguments(found: Characterization) -> dict[str, Any]:
         *note_facts(found.notes),
     ]
     captions = {
-        "characterize.csv": "What the bench measured beside what the camera file says.",
-        "photon_transfer.png": "Temporal variance over the mean, whose slope is the system gain K",
+        "characterize.csv": "Measured values beside those of the camera file.",
+        "photon_transfer.png": "Temporal variance over the mean; the slope is the system gain K",
         "snr.png": "Signal over temporal noise over the photons on a pixel, with the model",
         "linearity.png": "Mean over photons, and the deviation from a straight line",
         "merged_snr.png": "SNR of all readouts merged, with the model; one by one they saturate",
         "merged_snr.csv": "SNR of all readouts merged, measured and expected.",
-        "mtf.png": "Transfer of contrast of a slanted edge over spatial frequency, with the model",
+        "mtf.png": "MTF of a slanted edge over spatial frequency, with the model",
     }
     about = "Measured on simulated raw frames as EMVA 1288 and ISO 12233 have it."
     title = f"{found.bench.camera.name}: a camera on the bench"

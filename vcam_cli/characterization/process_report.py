@@ -23,7 +23,7 @@ from vcam_cli.physics import photodiode, silicon
 
 KINDS = ("ndiff-psub", "nwell-psub", "photogate", "pinned")
 WAVELENGTHS = (450e-9, 550e-9, 650e-9)
-"""Where the parts of the photocurrent are told [m]."""
+"""Wavelengths at which the parts of the photocurrent are reported [m]."""
 FEATURES = 19
 """Width of the pixel that is taken, in feature sizes: 6.65 um at 0.35 um."""
 BASE = "csf-0.35um"
@@ -54,7 +54,7 @@ class KindReport:
 
 
 def process_report(technology: str) -> Iterator[tuple[str, KindReport | str]]:
-    """Yield each kind of photodetector with its report, or the reason why there is none.
+    """Yield each kind of photodetector with its report, or the reason why it has none.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ def accuracy(
     wants_report: options.Report = False,
     formats: options.Formats = None,
 ) -> None:
-    """Show what accuracy costs: error and seconds of every preset, knob and effect.
+    """Measure error and time of every accuracy preset, setting and effect.
 
     Errors are those of the mean raw frame against a converged reference. Write accuracy.csv,
     accuracy.png and accuracy.json, and recommend a setting for the camera file.
@@ -62,7 +62,7 @@ def print_report(found: "Study", path: Path) -> None:
     console = Console(width=width, soft_wrap=True, highlight=False)
     title = "error against the converged reference, and its ratio to the tolerance T of the setting"
     _table(console, f"{title}; of a knob: its own error", SETTINGS, settings(found))  # fmt: skip
-    _table(console, "each effect skipped: change expected by the plan, and measured", EFFECTS,
+    _table(console, "each effect skipped: change estimated by the plan, and measured", EFFECTS,
            effects(found))  # fmt: skip
     for knob, why in found.absent.items():
         console.print(f"{knob} does not apply: {why}")

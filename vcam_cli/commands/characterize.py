@@ -36,7 +36,7 @@ def characterize(
     """Measure a camera on a simulated bench: photon transfer, noise, range, linearity, MTF.
 
     The methods are those of EMVA 1288 and ISO 12233, applied to raw frames; each value is shown
-    beside the one expected of the camera file. Write characterize.csv, characterize.json,
+    beside the one computed from the camera file. Write characterize.csv, characterize.json,
     photon_transfer.png, snr.png, linearity.png and mtf.png.
 
     \b

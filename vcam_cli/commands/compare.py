@@ -94,7 +94,7 @@ def compare(
     space: Annotated[
         Literal["srgb", "linear-srgb", "xyz"] | None,
         typer.Option(
-            "--space", help="Color space of the values; default what each file says, else srgb."
+            "--space", help="Color space of the values; default from each file, else srgb."
         ),
     ] = None,
     white: Annotated[

@@ -26,11 +26,11 @@ def dataset(
     shard: Shard = None,
     fresh: Fresh = False,
 ) -> None:
-    """Write frames of a camera whose parameters are drawn, with every label.
+    """Write frames of a camera with random parameters, and their labels.
 
-    Write shards of raw codes and of the same without noise, manifest.csv with all that was drawn,
-    the noise model's numbers and hashes, and dataset.json. Finished frames are kept: what was
-    stopped goes on when it is started again. --seed is that of all that is drawn.
+    Write shards of raw codes with and without noise, manifest.csv with the drawn parameters, the
+    noise model's numbers and hashes, and dataset.json. Finished frames are kept: an interrupted
+    data set continues when it is started again. --seed seeds all draws.
 
     \b
     Example:
@@ -57,7 +57,7 @@ def dataset(
                     lambda message: options.say(message, quiet),
                 )
         except KeyboardInterrupt as error:
-            options.say("interrupted; finished frames are kept, the same command goes on with them")
+            options.say("interrupted; finished frames are kept, and the same command continues")
             raise typer.Exit(INTERRUPTED) from error
     say_missing("manifest.csv", "frames", found.frames, found.missing)
     if as_json:

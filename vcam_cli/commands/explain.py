@@ -33,8 +33,8 @@ def explain(
     entries = list(explanations(name))
     if not entries:
         near = nearest(name, names())
-        remedy = f"did you mean {near}?" if near else "`vcam list` shows what there is"
-        raise bad((), f"nothing here is called {name!r}", remedy)
+        remedy = f"did you mean {near}?" if near else "`vcam list` shows all names"
+        raise bad((), f"no key, effect or term is named {name!r}", remedy)
     if as_json:
         options.write_json({"name": name, "explanations": entries})
         return
@@ -153,7 +153,7 @@ def _of_effect(word: str) -> Iterator[dict[str, Any]]:
     if effect is None:
         return
     filters = issubclass(effect, Blur | FieldTransfer | SeparableTransfer | ImageMotion)
-    cost = "a transform or two; the plan says how long they take" if filters else "little"
+    cost = "one or two Fourier transforms; the plan shows their time" if filters else "little"
     if effect.seconds_per_pixel:
         cost = f"about {effect.seconds_per_pixel * 1e9:.2g} ns a pixel on one core"
     keys = [

@@ -28,11 +28,12 @@ def fit(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Estimate a camera from dark frames, flat frames and edges, every number with its interval.
+    """Estimate a camera from dark frames, flat frames and edges, with confidence intervals.
 
     Write camera.yaml, which runs as it is, parameters.csv with 90 % intervals and methods (EMVA
     1288 release 4.0 where it defines one), plots of photon transfer, dark signal and intervals,
-    mtf.csv where there are edges, and fit.json. What the frames cannot tell is listed.
+    mtf.csv where there are edges, and fit.json. Parameters that the frames do not determine are
+    listed.
 
     \b
     Example:
@@ -49,7 +50,7 @@ def fit(
     for note in found.notes:
         options.say(note, quiet)
     for name in found.unknown:
-        options.say(f"not told by the frames: {name}", quiet)
+        options.say(f"not determined by the frames: {name}", quiet)
     options.print_found(found, path, as_json, quiet, print_fit)
 
 

@@ -24,10 +24,10 @@ def init(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Write a small commented camera file and a study of it, which run as they are.
+    """Write a small commented camera file and a study of it, both ready to run.
 
-    Existing files are never overwritten. The JSON Schemas beside them, in `schemas`, are what an
-    editor completes and checks the two with.
+    Existing files are never overwritten. The JSON Schemas in `schemas` let an editor complete
+    and check both files.
 
     \b
     Example:

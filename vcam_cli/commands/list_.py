@@ -39,11 +39,11 @@ def list_(
         bool,
         typer.Option(
             "--report",
-            help="Of a technology: where its photodetectors' photocurrent and dark current arise.",
+            help="Of a technology: photocurrent and dark current of its photodetectors by region.",
         ),
     ] = False,
 ) -> None:
-    """List what ships; with a NAME print the file.
+    """List shipped files, effects and metrics; with a NAME print the file.
 
     Kinds: cameras, parts, technologies, studies, measurements, charts, models
     (what a picture's channels mean), illuminants, filters, lenses, effects, steps (of processing),
@@ -203,21 +203,21 @@ def _metrics() -> list[Item]:
         " D + r^2)), with dark charge D and read and reset noise r [dB] (Chen 2003, eq 3.2)",
         "dynamic_range_db": "dynamic range of a pixel, 20 log10((full well - D) / sqrt(D + r^2)),"
         " before the ADC [dB] (Chen 2003, eq 3.1)",
-        "well_capacity": "full well of what one raw value counts [e]",
-        "quantized_dynamic_range_db": "the same up to the ADC's end, with its rounding: what a data"
-        " sheet's range is to be compared with [dB]",
+        "well_capacity": "full well of one raw value [e]",
+        "quantized_dynamic_range_db": "the same up to the ADC's highest code, with quantization"
+        " noise: comparable to a data sheet's dynamic range [dB]",
         "picture_snr_db": "mean signal of this picture over its temporal noise [dB]",
         "gray_snr_db": "signal of 18 % gray on the axis over its temporal noise, in this exposure"
         " [dB]",
-        "digital_gain": "what the render multiplies the raw by, raw saturation = white = 1",
+        "digital_gain": "factor from raw to render, raw saturation = white = 1",
         "base_iso": "ISO speed at exposure.gain 1: 78 lx s / H, with the exposure H of the sensor"
         " by daylight D55 that fills the brightest color (ISO 12232, saturation-based)",
     }
     asked = {
-        "mse": "mean squared error against the ideal image; ask for it in `quality`",
-        "psnr": "peak signal-to-noise ratio, white = 1 [dB]; ask for it in `quality`",
-        "cielab": "mean CIELAB Delta E (1976) on the `display`; ask for it in `quality`",
-        "s-cielab": "mean S-CIELAB Delta E, as the eye sees it there; ask for it in `quality`",
+        "mse": "mean squared error against the ideal image; needs `mse` in `quality`",
+        "psnr": "peak signal-to-noise ratio, white = 1 [dB]; needs `psnr` in `quality`",
+        "cielab": "mean CIELAB Delta E (1976) on the `display`; needs `cielab` in `quality`",
+        "s-cielab": "mean S-CIELAB Delta E on the `display`; needs `s-cielab` in `quality`",
     }
     sampled = {
         "mtf50": "first frequency at which the MTF of the raw frame is one half, by the e-SFR of"

@@ -20,7 +20,7 @@ gc.set_threshold(50_000, 10, 10)
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 try:
-    with interrupts.exit_on_interrupt():  # most of the time until a command begins goes by here
+    with interrupts.exit_on_interrupt():  # imports take most of the start
         import errno
         import io
         import warnings
@@ -157,7 +157,7 @@ def report_failures() -> Iterator[None]:
         _exit("not enough memory; use a smaller array, or --accuracy draft", 3, error)
     except KeyboardInterrupt as error:
         _exit(
-            "interrupted; nothing unfinished was kept, run the same command again",
+            "interrupted; unfinished results were discarded, run the same command again",
             interrupts.INTERRUPTED,
             error,
         )

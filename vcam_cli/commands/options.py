@@ -175,7 +175,7 @@ Expect = Annotated[
     ),
 ]
 Json = Annotated[
-    bool, typer.Option("--json", help="Machine-readable summary on stdout, nothing else there.")
+    bool, typer.Option("--json", help="Print only a machine-readable summary to stdout.")
 ]
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="No messages but errors.")]
 Report = Annotated[
@@ -202,7 +202,7 @@ Formats = Annotated[
         metavar="FORMAT",
         callback=check_formats,
         autocompletion=lambda: ["svg", "pdf"],
-        help="Write plots as svg or pdf, too, beside PNG. Repeatable.",
+        help="Also write plots as svg or pdf, in addition to PNG. Repeatable.",
     ),
 ]
 MOST_WORKERS_A_CORE = 4
@@ -210,7 +210,7 @@ MOST_WORKERS_A_CORE = 4
 
 
 def few_workers(asked: int | None) -> int | None:
-    """Return how many of the workers that were asked for are used, and say which."""
+    """Return the number of workers used of those requested, and report it."""
     if asked is None:
         return None
     from vcam_cli.parallel import available_workers
@@ -296,7 +296,7 @@ def print_rows(columns: Sequence[str], rows: Sequence[Sequence[str]], plain: str
     """Print rows as a table in a terminal, elsewhere as plain text.
 
     columns: headings, those of numbers beginning with ">"; cells wrap where the terminal is narrow;
-    plain: the text that stands for all of them.
+    plain: the text that replaces the table.
     """
     if not sys.stdout.isatty():
         print(plain)
@@ -317,7 +317,7 @@ def print_rows(columns: Sequence[str], rows: Sequence[Sequence[str]], plain: str
 
 
 def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print rows as a table, in columns of plain text where a terminal is none or too narrow.
+    """Print rows as a table, in columns of plain text without a terminal or in a narrow one.
 
     columns: headings, those of numbers beginning with ">".
     """

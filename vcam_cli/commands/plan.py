@@ -21,8 +21,8 @@ Measure = Annotated[
     bool,
     typer.Option(
         "--measure",
-        help="With --scenes: also take frames before every scene, with the effects of the plan"
-        " and with all, and write the measured seconds.",
+        help="With --scenes: also time frames of every scene, with the planned effects and with"
+        " all of them.",
     ),
 ]
 Turns = Annotated[
@@ -75,11 +75,10 @@ def plan(
     details: Details = False,
     formats: options.Formats = None,
 ) -> None:
-    """Show which effects a run simulates, which not and why, and what it costs.
+    """Show the effects that a run simulates or skips, with reasons, and its time and memory.
 
-    The irradiance on the pixels is computed, since the contribution of an effect depends on the
-    scene. No frame is exposed, except with --measure, and nothing is written, except with --scenes
-    and with --lens.
+    Computes the irradiance on the pixels, since the contribution of an effect depends on the
+    scene. Only --measure takes frames, and only --scenes and --lens write files.
 
     \b
     Example:
@@ -94,7 +93,9 @@ def plan(
     """
     if lens:
         if scenes or geometry or as_json:
-            raise typer.BadParameter("--lens is by itself; leave out --scenes, --geometry, --json")
+            raise typer.BadParameter(
+                "--lens excludes --scenes, --geometry and --json; leave them out"
+            )
         from vcam_cli.commands.plan_lens import plan_lens
 
         plan_lens(camera, out, options.overrides(set_, accuracy=accuracy), quiet, formats)

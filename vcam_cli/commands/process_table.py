@@ -54,7 +54,7 @@ def _photocurrents(found: list[KindReport]) -> Iterator[str]:
 def _dark_currents(found: list[KindReport]) -> Iterator[str]:
     yield ""
     yield "dark current density nA/cm2, of the same regions (eq 2.31); the junction's highest field"
-    yield "after a reset; what tunneling by traps makes of the sum (junction.tunneling: traps)"
+    yield "after a reset; the sum with trap-assisted tunneling (junction.tunneling: traps)"
     yield "kind            n        depletion        p        sum    field MV/m    with traps"
     for r in found:
         holes, generation, electrons = (part * NA_CM2 for part in r.dark)

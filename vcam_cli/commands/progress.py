@@ -57,7 +57,7 @@ WORDS = {
 
 
 def may_draw(quiet: bool = False) -> bool:
-    """Tell whether a bar may be drawn: stderr is a terminal, and nobody has asked for silence."""
+    """Return whether a bar may be drawn: stderr is a terminal, and --quiet is not set."""
     plain = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
     return not quiet and not plain and sys.stderr.isatty()
 

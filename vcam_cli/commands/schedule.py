@@ -159,6 +159,6 @@ def target_sentence(target: "FewestCaptures", bound: float) -> str:
     if not target.possible:
         return f"{gain} is out of reach: no number of captures gains more than {bound:.6g}"
     if target.count is None:
-        return f"{gain} takes more captures than were tried; the most gain {target.gain:.6g}"
+        return f"{gain} needs more captures than were tried; the largest gain {target.gain:.6g}"
     captures = "1 capture" if target.count == 1 else f"{target.count} captures"
     return f"{gain} takes {captures}, which gain {target.gain:.6g}"

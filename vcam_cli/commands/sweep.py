@@ -87,7 +87,7 @@ def sweep(
 ) -> None:
     """Run a sweep study; print its results, write points.csv, optimum.csv and plots.
 
-    Finished points are kept: a sweep that was stopped goes on when it is started again.
+    Finished points are kept: an interrupted sweep continues when it is started again.
 
     \b
     Example:
@@ -123,7 +123,7 @@ def sweep(
                     expect or (),
                 )
         except KeyboardInterrupt as error:
-            options.say("interrupted; finished points are kept, the same command goes on with them")
+            options.say("interrupted; finished points are kept, and the same command continues")
             raise typer.Exit(INTERRUPTED) from error
     if len(messages) > MOST_MESSAGES:
         options.say(f"and {len(messages) - MOST_MESSAGES} more", quiet)
@@ -141,7 +141,7 @@ def sweep(
 
 
 def say_missing(table: str, rows: str, total: int, missing: int) -> None:
-    """Say that a table is not whole, also to those who asked for quiet: they may go on with it."""
+    """Report an incomplete table, with --quiet too: a later step may use it."""
     if missing:
         there = total - missing
         options.say(f"{table} has {there} of {total} {rows} so far; other shares compute the rest")

@@ -20,10 +20,10 @@ VERBS = {
 }
 """A word in place of a command -> the command."""
 OPTIONS = {
-    **dict.fromkeys(("--resume", "--continue"), "none; the same command goes on where it stopped"),
+    **dict.fromkeys(("--resume", "--continue"), "none; repeat the command to continue"),
     **dict.fromkeys(("--jobs", "--threads", "--cores", "--processes"), "--workers"),
     **dict.fromkeys(("--output", "--output-dir", "--dir"), "--out"),
-    **dict.fromkeys(("--verbose", "--debug"), "none; vcam plan says what a run does, and why"),
+    **dict.fromkeys(("--verbose", "--debug"), "none; vcam plan shows a run's effects, and why"),
 }
 """An option of other programs -> the one of this."""
 _EXTRA = "Got unexpected extra argument"
@@ -72,4 +72,4 @@ def _meant_argument(extra: str) -> str:
 
     if PurePath(extra).suffix.lower() in PICTURES:
         return f'for a scene write --set scene.source="{{kind: image, file: {extra}}}"'
-    return 'a value with spaces stands in quotes, as in --set pixel.width="3 um"'
+    return 'put a value with spaces in quotes, as in --set pixel.width="3 um"'

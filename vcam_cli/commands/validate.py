@@ -25,7 +25,7 @@ def validate(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Check camera, study, measurement and lens files: report everything that is wrong.
+    """Check camera, study, measurement and lens files, and report all errors.
 
     \b
     Example:

@@ -37,11 +37,11 @@ def verify(
 ) -> None:
     """Predict measured signals from a camera file, and show the errors.
 
-    Mean signals under even light of known irradiance, stated or of raw frames, are predicted as
-    the camera's pixels give them, its lens left out. Write verify.csv, verify.json and
-    errors.png, a histogram of the errors. Of raw frames variances, spectra of rows and columns,
-    tails and patterns are predicted, too, and judged by what is chance. The exit code is 4 where
-    an error is larger than the measurement's tolerance, and more than chance.
+    Mean signals under uniform light of known irradiance, stated or of raw frames, are predicted
+    from the camera's pixels, without its lens. Write verify.csv, verify.json and
+    errors.png, a histogram of the errors. For raw frames, variances, spectra of rows and
+    columns, tails and patterns are predicted and tested for significance, too. The exit code is 4
+    where an error exceeds the measurement's tolerance and is significant.
 
     \b
     Example:

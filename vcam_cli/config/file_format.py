@@ -1,4 +1,4 @@
-"""What a package says of its files, as far as reading them depends on it."""
+"""Description of a package's file kinds, as their reader needs it."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,7 +12,7 @@ from vcam_cli.errors import Problem
 
 M = TypeVar("M", bound=FileModel)
 Check = tuple[Callable[[M], None], str]
-"""What raises BadInput for a model that is wrong, and the sections that it needs to say so."""
+"""What raises BadInput for a model that is wrong, and the sections that it needs."""
 
 
 def names_file(keys: frozenset[Key], key: Key, kind: object) -> bool:
@@ -42,7 +42,7 @@ class FileFormat(Generic[M]):
     words: Mapping[errors.Path, str] = field(default_factory=dict)
     """Where a part file may stand -> a word that names none."""
     shorthands: Mapping[errors.Path, Key] = field(default_factory=dict)
-    """Where a text stands for a mapping of this one key -> the key."""
+    """Where a text replaces a mapping of this one key -> the key."""
     file_keys: frozenset[Key] = frozenset()
     """Keys that hold names of data files: `names_file`."""
     merge_rules: MergeRules = NO_RULES

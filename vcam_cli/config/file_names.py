@@ -55,7 +55,7 @@ def _refuse_other_kind(name: str, kind: str) -> None:
 def referenced_file(name: Node, kind: str, chain: tuple[Path, ...] = ()) -> Path:
     """Return the file of a kind that a text in a YAML file names.
 
-    `chain` are the files that led here, none of which is meant by a name. Raises BadInput.
+    `chain` are the files that led here, a name refers to none of these. Raises BadInput.
     """
     text, folder = name.value, name.source.folder
     if not isinstance(text, str) or not text:

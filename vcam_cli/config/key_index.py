@@ -25,7 +25,7 @@ class Key:
     example: str
     """A value, as YAML has it."""
     default: Any
-    """Value where it is not given, as YAML has it; None where there is none."""
+    """Value where it is not given, as YAML has it; None without a default."""
     required: bool
     """Whether it must be given."""
     model: type[BaseModel]

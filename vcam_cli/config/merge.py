@@ -73,7 +73,7 @@ def merge(base: Node, over: Node, rules: MergeRules = NO_RULES, path: errors.Pat
 
 
 def _over_value(base: Node, over: Node, rules: MergeRules, path: errors.Path) -> Node:
-    """Lay a mapping over what is none: it stands alone, but beside the name of a part."""
+    """Lay a mapping over another value: it stands alone, but beside the name of a part."""
     assert over.mapping is not None
     key = rules.part_keys.get(path) if isinstance(base.value, str) else None
     if key is None or base.value == rules.words.get(path):

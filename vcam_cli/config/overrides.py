@@ -54,14 +54,14 @@ def overlay_values(changes: Mapping[str, Any], folder: Path, rules: MergeRules) 
 
 
 def _example(item: str) -> str:
-    """Return an override as it is written, with the path and value given, if these can be told."""
+    """Return an override in its correct form, with the path and value given, if these are found."""
     if match := re.fullmatch(r"\s*([a-z_]\w*(?:\.\w+)*)\s*(?:[=:]\s*(\S.*)?|\s(\S.*))?", item):
         return f'{match[1]}="{match[2] or match[3] or "VALUE"}"'
     return "pixel.width=8um"
 
 
 def read_override(item: str, folder: Path) -> tuple[errors.Path, Node]:
-    """Return path and value of an override "PATH=VALUE". Raises BadInput for what is none."""
+    """Return path and value of an override "PATH=VALUE". Raises BadInput for another form."""
     path, _, text = item.partition("=")
     keys = errors.split(path.strip())
     if "" in path.strip().split(".") or not text.strip():

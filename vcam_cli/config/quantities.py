@@ -1,8 +1,8 @@
 """Types of numbers in a file: quantities with a unit, bare numbers, whole numbers.
 
 A quantity is a string with its unit in YAML ("6.5 um"), an SI float in the model, and a string
-again when the model is written (`units.render`, which loses nothing). Where a word may stand for
-a value ("auto", "none") the type says so: `Quantity("length", words={"auto": None})`.
+again when the model is written (`units.render`, which loses nothing). Where a word may replace
+a value ("auto", "none") the type lists it: `Quantity("length", words={"auto": None})`.
 """
 
 import math
@@ -28,7 +28,7 @@ as it likes.
 
 @dataclass(frozen=True, kw_only=True)
 class Numeric(YamlType):
-    """Base of the types of numbers: limits, and words that stand for a value."""
+    """Base of the types of numbers: limits, and words that replace a value."""
 
     above: float = -math.inf
     """Exclusive lower limit."""

@@ -1,4 +1,4 @@
-"""`--set` of a study: its own keys, or where the first is none of them those of its camera.
+"""`--set` of a study: its own keys, or else those of its camera.
 
 Keys of a study may be paths of a camera with dots in them: `vary.pixel.width.count=8` is the key
 `count` of `pixel.width` in `vary`.

@@ -83,7 +83,7 @@ def describe(value: object) -> str:
 
 
 def one_of(value: object, allowed: Iterable[object], also: str = "") -> tuple[str, str]:
-    """Return message and remedy for a value that is none of the allowed words."""
+    """Return message and remedy for a value that is not an allowed word."""
     words = [str(word) for word in allowed]
     near = nearest(value, words) if len(words) > 1 else None
     listed = ", ".join(words) + (f", or {also}" if also else "")

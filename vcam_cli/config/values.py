@@ -81,7 +81,7 @@ class Either(YamlType):
     forms: Any
     """Types for the JSON Schema."""
     words: Mapping[str, Any] = field(default_factory=lambda: NO_WORDS, hash=False)
-    """Words that stand for a value ("none" for None)."""
+    """Words that replace a value ("none": None)."""
     yaml_form: Callable[[Any], Any] = to_yaml
     """What returns the YAML form of a value."""
 

@@ -44,7 +44,7 @@ _WORDS = {"": None} | {word: value for words, value in _SPELLINGS.items() for wo
 def read_file(path: Path) -> Node:
     """Return the tree of a YAML file.
 
-    Raises BadInput for a file that is none, is too large, or is not the YAML described above,
+    Raises BadInput for a path that is no file, is too large, or is not the YAML described above,
     CannotDo where permission is missing.
     """
     source = Source(display_path(path), path.absolute().parent)

@@ -50,7 +50,7 @@ class Node:
         return self.value if isinstance(self.value, dict) else None
 
     def get(self, key: Key) -> "Node | None":
-        """Return the value of a mapping's key; None where there is none."""
+        """Return the value of a mapping's key; None without it."""
         return self.value.get(key) if isinstance(self.value, dict) else None
 
     def drop(self, key: Key) -> "Node":

@@ -69,7 +69,7 @@ def dataset(
     watch: Observer | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> DatasetResult:
-    """Compute a data set, or what is left of it, and write shards, manifest and record.
+    """Compute the missing frames of a data set, and write shards, manifest and record.
 
     Raises BadInput (a share of more than there are shards, a foreign folder), CannotDo.
     """
@@ -145,7 +145,7 @@ def _of_share(whole: list[Shard], execution: Execution) -> list[Shard]:
 
 
 class _Frames:
-    """The frames that are computed, and what is known of them."""
+    """The frames to compute, and their records."""
 
     def __init__(self, folder: SweepFolder, fresh: bool, code: str) -> None:
         self._folder, self._fresh, self._code = folder, fresh, code

@@ -132,10 +132,10 @@ def _check_camera(model: Dataset, camera: Camera) -> None:
         message = "its pixels are not on a grid of rows and columns"
         raise BadInput([_problem(model, ("camera",), message, "take another pattern")])
     if camera.exposure.has_samples:
-        message = "it takes several samples of one integration, or a bracket"
+        message = "it has several samples of one integration, or a bracket"
         raise BadInput([_problem(model, ("camera",), message, "give exposure.time")])
     if "depth" in model.write and camera.scene.moves:
-        message = "the scene moves, so that its depth is not one"
+        message = "the scene moves, so its depth is not unique"
         raise BadInput([_problem(model, ("write",), message, "leave depth out")])
 
 

@@ -151,7 +151,7 @@ def _computed(model: Dataset, path: str, values: dict[str, Any], factor: float =
     except ValueError as error:
         key = ("vary", path, "from")
         said = ", ".join(f"{name} = {value}" for name, value in known.items())
-        remedy = f"correct the formula{f' or what it is of ({said})' if said else ''}"
+        remedy = f"correct the formula{f' or its source ({said})' if said else ''}"
         raise BadInput([Problem(key, str(error), remedy, model.locate(key))]) from None
 
 

@@ -47,7 +47,9 @@ def _only(number: Callable[..., float]) -> Callable[[Sequence[_Value]], _Value]:
 
     def apply(given: Sequence[_Value]) -> _Value:
         if any(value.kinds for value in given):
-            raise ValueError("a function of a number is given a unit; divide by a unit first")
+            raise ValueError(
+                "a function of a pure number has an argument with a unit; divide by a unit first"
+            )
         values = [value.number for value in given]
         try:
             return _Value(number(*values))
@@ -90,7 +92,9 @@ class _Value:
     def power(self, other: _Value) -> _Value:
         """Return the power, of bare numbers or by whole numbers."""
         if other.kinds or (self.kinds and other.number != int(other.number)):
-            raise ValueError("a power is a bare number, and a whole one of what has a unit")
+            raise ValueError(
+                "an exponent is a number without a unit, and an integer for a base with a unit"
+            )
         raised = self.number**other.number
         if isinstance(raised, complex):
             raise ValueError("a negative number has no such power")
@@ -148,7 +152,7 @@ class Formula:
         Raises
         ------
         ValueError
-            Units that do not go together, a division by zero, a number that is none.
+            Incompatible units, a division by zero, an invalid number.
         """
 
         def find(name: str) -> _Value:
@@ -173,7 +177,7 @@ class Formula:
 
 @lru_cache(maxsize=1024)  # read once for all frames
 def read_formula(text: str) -> Formula:
-    """Return a formula; raise ValueError with a sentence where the text is none.
+    """Return a formula; raise ValueError with a sentence for an invalid text.
 
     >>> read_formula("20 ms / exposure.gain").value({"exposure.gain": 4})
     '5 ms'

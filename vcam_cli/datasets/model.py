@@ -55,7 +55,7 @@ _ENDS = list[str | float]
 
 
 class Distribution(Model):
-    """What a parameter is drawn from."""
+    """Distribution of a parameter."""
 
     uniform: Annotated[tuple[Any, Any] | None, Either(_range, _ENDS)] = key(
         "all values between two ends are equally probable",
@@ -77,22 +77,21 @@ class Distribution(Model):
     )
 
     from_: Annotated[str | None, Either(_formula, str)] = key(
-        "a formula over keys above it, by their paths or last words, with units, + - * / ^, sqrt,"
-        " exp, log (natural), min, max: what ties draws together",
+        "formula over keys above it, by their paths or last words, with units, + - * / ^, sqrt,"
+        " exp, log (natural), min, max: couples parameters",
         example="20 ms / exposure.gain",
         alias="from",
         default=None,
     )
     scatter: Annotated[float, Number(least=0, most=10, example="0.25")] = key(
-        "of from: standard deviation of the natural logarithm of what it is multiplied by, which is"
-        " drawn from a normal distribution",
+        "of `from`: standard deviation of the natural logarithm of a log-normal factor on it",
         default=0.0,
     )
 
     rules = (
         exactly_one(
             *("uniform", "log_uniform", "integers", "choice", "from"),
-            of="what it is drawn from",
+            of="distribution",
             remedy="write {uniform: [10 ms, 30 ms]}",
         ),
     )
@@ -118,7 +117,7 @@ class Distribution(Model):
     @model_validator(mode="after")
     def _only_a_formula_scatters(self) -> Self:
         if self.scatter and self.from_ is None:
-            message = "only what a formula gives scatters"
+            message = "scatter applies only to `from`"
             raise refusal(("scatter",), message, "remove it, or write from")
         return self
 
@@ -144,7 +143,7 @@ def _charts(given: Any) -> tuple[Any, ...]:
 
 
 class Scenes(Model):
-    """What the frames show."""
+    """Scenes of the frames."""
 
     files: Annotated[tuple[str, ...], Either(_patterns, str | list[str])] = key(
         "pictures, of which each scene is a crop at random",
@@ -160,7 +159,7 @@ class Scenes(Model):
         "samples of a picture over the width of a pixel: how much of it a crop takes", default=1.0
     )
     frames_each: Annotated[int, Whole(least=1, most=MOST_FRAMES, example="4")] = key(
-        "frames in a row of one scene, for which crop and light are drawn once", default=1
+        "consecutive frames of one scene, with the same crop and light", default=1
     )
 
     rules = (at_most_one("files", "charts"),)
@@ -174,7 +173,7 @@ class Size(Model):
 
 
 class Dataset(FileModel):
-    """A data set: frames of a camera whose parameters are drawn, with every label."""
+    """A data set: frames of a camera with random parameters, and their labels."""
 
     kind: Literal["dataset"] = key("the kind of study", example="dataset")
     name: Word = key(
@@ -184,12 +183,12 @@ class Dataset(FileModel):
     )
     camera: Text = key("name or path of a camera file", example="starter")
     scenes: Annotated[Scenes | None, mapping(Scenes)] = key(
-        "what the frames show; default the camera's own scene",
+        "scenes of the frames; default the camera's own scene",
         example={"files": "photos/*.png"},
         default=None,
     )
     vary: dict[str, Distribution] = key(
-        "path in the camera -> what it is drawn from, or a formula over keys above it",
+        "path in the camera -> its distribution, or a formula over keys above it",
         example={"exposure.time": {"log_uniform": ["1 ms", "100 ms"]}},
         default=dict,
     )
@@ -202,10 +201,10 @@ class Dataset(FileModel):
         default=None,
     )
     write: Annotated[tuple[str, ...], words_of(KINDS, 1)] = key(
-        "what is written of a frame: raw (codes), clean (the same without noise and rounding,"
-        " clipped: near saturation the mean of raw frames lies below it),"
-        " ideal (the scene at the pixels' centers, all colors, in codes), depth (in m along the"
-        " axis; of layers that of the nearest)",
+        "outputs of a frame: raw (codes), clean (codes without noise and rounding, clipped: "
+        "near saturation the mean of raw frames is lower), ideal (the scene at the pixels' "
+        "centers, all colors, in codes), depth (distance along the axis in m, of the nearest "
+        "layer)",
         example=["raw", "clean"],
         default=("raw", "clean"),
     )
@@ -217,7 +216,7 @@ class Dataset(FileModel):
         default="npz",
     )
     seed: Annotated[int, Whole(least=0, most=2**63 - 1, example="1")] = key(
-        "of all that is drawn; the frames' own seeds follow from it", default=1
+        "seed of all draws; the frames' seeds follow from it", default=1
     )
 
     @model_validator(mode="after")
@@ -226,11 +225,11 @@ class Dataset(FileModel):
         if mistakes:
             raise failure(mistakes)
         if self.scenes is not None and self.scenes.files and self.size is None:
-            message = "the size of the frames is missing, which is that of the crops"
+            message = "the size of the frames, and so of crops, is missing"
             raise refusal((), message, "add size: {rows: 512, columns: 512}")
         if self.shards > self.frames:
             message = f"{self.frames} frames do not fill {self.shards} shards"
-            raise refusal(("shards",), message, "ask for fewer shards")
+            raise refusal(("shards",), message, "set fewer shards")
         return self
 
     def named(self, name: str) -> list[str]:
@@ -248,7 +247,7 @@ class Dataset(FileModel):
                     remedy = f"write one of the keys above: {', '.join(above) or '(none)'}"
                     yield fault(("vary", path, "from"), some, remedy)
                 elif not self.vary[found[0]].is_number:
-                    message = f"{found[0]} is drawn from what is no number"
+                    message = f"{found[0]} has a distribution over values that are not numbers"
                     yield fault(("vary", path, "from"), message, "name another key")
             above.append(path)
 

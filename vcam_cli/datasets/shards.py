@@ -1,8 +1,8 @@
-"""Shards: finished frames of a data set, packed together, and what is known of them.
+"""Shards: finished frames of a data set, packed together, with their records.
 
 A frame is kept by itself when it is finished, as a point of a sweep is. When all frames of a shard
 are there they are packed, one after the other, and kept no longer: the disk holds each frame once,
-and one shard more. What is known of a shard and its frames is a point of its own.
+and one shard more. The record of a shard and its frames is a point of its own.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class Packer:
     """The record that the folder had: files that it proves may be replaced."""
 
     def content(self, shard: Shard) -> dict[str, Any] | None:
-        """Return what is known of a shard: its files, and hashes, labels, errors of its frames."""
+        """Return the record of a shard: its files, and hashes, labels, errors of its frames."""
         return self.folder.read(shard.id(self.format, self.scale))
 
     def files(self, shard: Shard) -> dict[str, Fingerprint] | None:
@@ -93,7 +93,7 @@ class Packer:
         return files
 
     def _frames(self, shard: Shard, content: dict[str, Any]) -> Iterator[NamedArrays]:
-        """Yield name and arrays of all frames but those that failed; fill in what is known."""
+        """Yield name and arrays of all frames that did not fail; fill in their records."""
         for number, point in zip(shard.frames, shard.ids, strict=True):
             name, known = shard.name(number), self.folder.read(point)
             outcome = read_outcome(point, known or {})
@@ -161,7 +161,7 @@ def _hash(values: Array) -> str:
 
 
 def shards(frames: int, count: int, ids: Sequence[str]) -> list[Shard]:
-    """Return the shards of so many frames, of like size, in the order of the frames."""
+    """Return the shards of `frames`, of equal size, in the order of the frames."""
     ends = [frames * n // count for n in range(count + 1)]
     digits = max(6, len(str(frames - 1)))
     return [

@@ -12,7 +12,7 @@ from threading import Lock, Timer
 from vcam_cli.files import atomic
 
 SECONDS = 1.0
-"""Within so many after a file was written it is on the disk."""
+"""Longest delay before a written file is on the disk [s]."""
 
 
 class DelayedFlush:

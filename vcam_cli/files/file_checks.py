@@ -1,4 +1,4 @@
-"""What makes a file unusable: checks before it is read, and what the user is told."""
+"""Checks of a file before it is read, and the errors that they report."""
 
 import os
 import stat
@@ -71,7 +71,7 @@ def check_regular(path: Path) -> int:
     if not stat.S_ISREG(status.st_mode):
         raise UnusableFile("is a device, pipe or socket", "give a regular image file")
     if status.st_size == 0:
-        raise UnusableFile("the file is empty", "give a whole image file")
+        raise UnusableFile("the file is empty", "give a complete image file")
     return status.st_size
 
 

@@ -33,7 +33,7 @@ def add_array(archive: zipfile.ZipFile, name: str, values: Array) -> None:
 
 
 def read_arrays(path: Path) -> dict[str, Array]:
-    """Return the arrays of an archive. Raise OSError or ValueError where it is none."""
+    """Return the arrays of an archive. Raise OSError or ValueError for another file."""
     with np.load(path, allow_pickle=False) as archive:
         return {name: archive[name] for name in archive.files}
 

@@ -67,7 +67,7 @@ _METADATA: dict[str, dict[str, Any]] = {
     "svg": {"Date": None, "Creator": None},
     "pdf": {"CreationDate": None, "Producer": None, "Creator": None},
 }
-"""Format -> what is left out of its files, since it would change from run to run."""
+"""Format -> metadata omitted from its files, since they would change from run to run."""
 
 
 def save(figure: Any, path: Path | str) -> None:
@@ -128,7 +128,7 @@ def plot_figure(path: Path | str, size: tuple[float, float], dpi: int = 150) -> 
 
 
 INK, FAINT = "#123456", "#654321"
-"""Stand for the colors of text and of grids in a drawing, which follow the reader's page."""
+"""Placeholders of the colors of text and grids in a drawing, which follow the reader's page."""
 PAGE_COLORS = (
     "<style>svg { color: #1c1e21 } @media (prefers-color-scheme: dark) { svg { color: #e4e6e9 } }"
     "</style>"

@@ -102,7 +102,7 @@ class SweepFolder:
         return all(map(_POINT_FILE.fullmatch, names - {POINTS}))
 
     def begin(self, record: Mapping[str, Any], study: str = "0") -> dict[str, Any]:
-        """Return the record of the folder; write this one first where there is none.
+        """Return the record of the folder; without one, write this one first.
 
         study: hexadecimal hash of what the tables will show. Raise CannotDo where another process
         is at work on something else here, BadInput where a file that would be replaced is not as

@@ -19,11 +19,11 @@ from vcam_cli.physics.radiometry import irradiance_per_radiance
 MTF = "mtf.csv"
 """The file of the lens's transfer, beside the camera file."""
 BLACK = 1.0
-"""Quantum efficiency that stands for one that is not known."""
+"""Quantum efficiency assumed where it was not measured."""
 
 
 def tree(found: Fit, conditions: Conditions, curves: list[Transfer]) -> dict[str, Any]:
-    """Return the camera file as YAML has it; adds to `found.unknown` what is left at a default."""
+    """Return the camera file as YAML has it; adds the keys left at a default to `found.unknown`."""
     measurement = found.measurement
     assert measurement.levels is not None
     assert measurement.pixel is not None
@@ -62,7 +62,7 @@ def tree(found: Fit, conditions: Conditions, curves: list[Transfer]) -> dict[str
         before = (entry.irradiance or 0.01) * math.pi / solid_angle
         scene |= {"irradiance": units.render(before, "irradiance"), "distance": "infinity"}
     if entry.irradiance is None:
-        found.unknown.append("irradiance of the flat frames: 0.01 W/m2 stands in the camera file")
+        found.unknown.append("irradiance of the flat frames: the camera file assumes 0.01 W/m2")
     usual = usual_temperature(measurement)
     array: dict[str, Any] = {
         "rows": conditions.shape[0],
@@ -150,8 +150,7 @@ def _efficiencies(found: Fit, curves: list[Transfer]) -> dict[str, float]:
     known = {c.color: c.efficiency.value for c in first if c.efficiency is not None}
     if len(known) < len(first):
         steps = {c.color: c.result.responsivity for c in first}
-        found.unknown.append("quantum efficiency: colors have that relative to the best, which is"
-                             " set to 1")  # fmt: skip
+        found.unknown.append("quantum efficiency: relative to that of the best color, set to 1")
         return {color: value / max(steps.values()) for color, value in steps.items()}
     if max(known.values()) > 1:
         found.notes.append("the quantum efficiency is above 1: irradiance or photons are too low")

@@ -28,7 +28,7 @@ DEAD, HOT = 0.1, 0.5
 """Signal of a dead pixel, over the others' in light, is less; that of a hot one, over saturation in
 the dark, is more."""
 LEAST_LIGHT = 0.1
-"""Signal of a color, over saturation, in which its dead pixels are told."""
+"""Signal of a color, over saturation, in which its dead pixels are found."""
 CLIPPED = 0.005
 """Share of pixels at the ends of the codes above which a stack counts as clipped (EMVA 1288)."""
 DRIFT = 0.01
@@ -53,7 +53,7 @@ class Condition:
     moments: tuple[PixelMoments, ...] = ()
     """Of the pixels of each plane, of the dark frames of the shortest exposure time."""
     differences: tuple[Array, ...] = ()
-    """Of each plane of these, how often pixels differ by so many codes (groups, codes)."""
+    """Of each plane of these, how often pixels differ by a number of codes (groups, codes)."""
 
     def mean(self, color: str) -> Estimate:
         """Return the mean of a color [DN]."""
@@ -81,7 +81,7 @@ class Condition:
 
 
 def shared(found: Estimate, planes: int, freedom: int) -> Estimate:
-    """Return the variance of lines in the mean over planes, of which so many share each line.
+    """Return the variance of lines in the mean over `planes` planes that share each line.
 
     What a line has of its own is the same in all of these: its error is that of the array's lines,
     however many planes there are. What the pixels add is independent.

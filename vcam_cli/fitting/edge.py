@@ -1,8 +1,8 @@
 """Sharpness from frames of a slanted edge: MTF50 of the system, and the transfer of the lens.
 
 The edge tells the transfer of lens and pixel together (e-SFR of ISO 12233, `quality.mtf`). That of
-a pixel of the camera file is known, the sinc of its sides along the edge's normal; what is left is
-the lens's, or the silicon's: it goes into the camera file as `optics.mtf`.
+a pixel of the camera file is known, the sinc of its sides along the edge's normal; the quotient is
+the MTF of the lens, or of the silicon: it goes into the camera file as `optics.mtf`.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def lens_transfer(responses: list[EdgeResponse], measurement: Measurement) -> Le
     Returns
     -------
     LensTransfer
-        As far as the pixel's aperture and the noise let it be told.
+        Up to the frequency where the pixel's MTF falls into the noise.
     """
     pixel = measurement.pixel
     assert pixel is not None

@@ -54,7 +54,7 @@ def fit(measurement: Measurement, watch: Observer | None = None) -> Fit:
     Returns
     -------
     Fit
-        Parameters, notes, what is not known, and the camera file.
+        Parameters, notes, unknown quantities, and the camera file.
 
     Raises
     ------
@@ -71,9 +71,7 @@ def fit(measurement: Measurement, watch: Observer | None = None) -> Fit:
     out.notes += against
     if not curves:
         message = "; ".join(against) or "there are no flat frames"
-        remedy = (
-            "add flat frames at five levels or more, dark frames of their exposure time beside them"
-        )
+        remedy = "add flat frames at five levels or more, and dark frames of the same exposure time"
         raise bad("frames", message, remedy).with_places(measurement.locate)
     gain = sensor.pooled_gain(curves)
     _of_dark(out, found, line, gain)
@@ -126,8 +124,8 @@ def _of_dark(out: Fit, found: Conditions, line: sensor.Dark, gain: Estimate) -> 
         if stated is not None and abs(stated - each.value) > 5 * each.error + 0.5:
             out.notes.append(f"levels.black is {stated:g}, but dark frames have {each.value:.2f}")
     if first.at_zero > CLIPPED:
-        out.notes.append(f"{first.label}: {first.at_zero:.1%} of the dark codes are 0, so that"
-                         " read noise and black level are not what they seem")  # fmt: skip
+        clipped = f"{first.label}: {first.at_zero:.1%} of the dark codes are clipped at 0"
+        out.notes.append(f"{clipped}, which biases read noise and black level")
     if line.current is None:
         out.unknown.append("dark current: all dark frames have one exposure time; it is part of"
                            " black level and read noise")  # fmt: skip
@@ -145,9 +143,9 @@ def _of_dark(out: Fit, found: Conditions, line: sensor.Dark, gain: Estimate) -> 
     if hidden:
         method = "EMVA 1288 R4 eq 54, upper limit: rounding hides smaller noise"
         out.notes.append(
-            "rounding to whole codes hides the read noise: its upper limit by EMVA 1288 eq 54 is"
-            " written, and the intervals of dark current, black level and dark patterns include"
-            " what rounding can hide. Raise the gain or the bits to measure them"
+            "quantization masks the read noise: its upper limit by EMVA 1288 eq 54 is written, and "
+            "the intervals of dark current, black level and dark patterns include the quantization "
+            "error. Raise the gain or the bits to measure them"
         )
         out.unknown.append("tails, traps and row correlation of the noise: rounding hides them")
     add(deviation("read_noise", read, gain, "e", method))
@@ -177,13 +175,13 @@ def _of_dark(out: Fit, found: Conditions, line: sensor.Dark, gain: Estimate) -> 
         add(parameter("read_noise_shape", shape, "1", method))
         if first.moments[0].frames < LEAST_FRAMES:
             out.notes.append(
-                "read noise has heavy tails; so few dark frames do not tell whether those are all"
-                " pixels' or those of few that have traps"
+                "read noise has heavy tails; more dark frames are needed to separate tails of"
+                " all pixels from a few pixels with traps"
             )
 
 
 def _all_differences(dark: Condition) -> Array:
-    """Return how often pixels of all planes differ by so many codes (groups, codes)."""
+    """Return how often pixels of all planes differ by a number of codes (groups, codes)."""
     most = max(counts.shape[1] for counts in dark.differences)
     total = np.zeros((max(len(counts) for counts in dark.differences), most))
     for counts in dark.differences:
@@ -249,7 +247,7 @@ def _of_patterns(
         _gain_variances(curve, i, found, line) for curve, i in zip(curves, chosen, strict=True)
     ]
     lights = len({curve.light for curve in curves})  # all of them show the same gains
-    # What noise is left in a mean frame counts less, relative to gains, the brighter it is.
+    # The residual noise of a mean frame counts less, relative to gains, the brighter it is.
     weights = [
         float(curve.result.series.signal[i]) ** 2 for curve, i in zip(curves, chosen, strict=True)
     ]
@@ -278,9 +276,10 @@ def _of_patterns(
         if is_significant(variance):
             add(deviation(key, variance, scale, unit, method))
     if is_significant(slow["shading_gain"][0]):
-        out.notes.append("flat frames are not even: shading by the lamp, by a lens and by the"
-                         " pixels look alike in them and are not told apart; all of it is written"
-                         " as shading of the pixels' gains")  # fmt: skip
+        out.notes.append(
+            "flat frames are not uniform: shading of the lamp, a lens and the pixels cannot be"
+            " separated in them; all of it is written as shading of the pixels' gains"
+        )
     defects, whole = found.defects, found.shape[0] * found.shape[1]
     for name, mask, n in (
         ("hot", defects.hot, whole),
@@ -340,7 +339,7 @@ def _of_edge(out: Fit, measurement: Measurement) -> None:
     tell: Callable[[str], None] = out.unknown.append
     edges = [stack for stack in stacks(measurement) if stack.entry.target == "slanted-edge"]
     if not edges:
-        tell("sharpness: there are no frames of an edge")
+        tell("sharpness: needs frames of an edge")
     seen: list[EdgeResponse] = []
     for stack in edges:
         try:

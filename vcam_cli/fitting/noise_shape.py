@@ -19,9 +19,9 @@ normal."""
 
 
 GROUPS = 20
-"""Groups of rows that are left out in turn, to see how sure a shape is."""
+"""Groups of rows left out in turn, for the confidence interval of a shape."""
 REACH = 40.0
-"""Largest difference that is told from larger ones, over the robust standard deviation."""
+"""Largest difference with a bin of its own, over the robust standard deviation."""
 FINENESS = 12
 """Grid points of densities in a standard deviation of the noise: they widen it by 1e-3 of it."""
 
@@ -32,7 +32,7 @@ def is_significant(found: Estimate) -> bool:
 
 
 def difference_counts(frames: Array, good: Array) -> Array:
-    """Return how often pixels differ by so many codes between two frames (groups, codes).
+    """Return how often pixels differ by a number of codes between two frames (groups, codes).
 
     Two and two frames are compared, so that no pair shares a frame. The last code counts all that
     differ by it or more.
@@ -128,7 +128,7 @@ def _readout(place: Array, half: int, points: int) -> Array:
 
 
 def _differences(mass: Array, beside: Array, size: int, codes: int, points: int) -> Array:
-    """Return the probability that two frames differ by so many codes, of either sign (codes,).
+    """Return the probability that two frames differ by a number of codes, of either sign (codes,).
 
     beside: transform of the difference of all else (size // 2 + 1,).
     """

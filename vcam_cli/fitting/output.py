@@ -35,12 +35,12 @@ def write(
 
 def report_arguments(found: Fit) -> dict[str, Any]:
     """Return title, text, facts and captions of the report."""
-    unknown = [f"not told by the frames: {name}" for name in found.unknown]
+    unknown = [f"not determined by the frames: {name}" for name in found.unknown]
     captions = {
         "parameters.csv": "Every number with its 90 % interval and its method.",
         "photon_transfer.png": "Temporal variance over signal, from which the gain follows",
         "dark_signal.png": "Dark frames: black level and dark current",
-        "intervals.png": "How sure each number is",
+        "intervals.png": "90 % confidence intervals",
         "mtf.csv": "Modulation transfer of the lens, the pixel's own taken out.",
     }
     return {

@@ -48,7 +48,7 @@ def pattern(stack: StackStatistics, good: Array) -> Pattern:
     """Return the spatial variances, freed of the temporal noise that is left in the mean.
 
     What is taken out has an error of its own, which is independent of that of the mean: of n
-    frames it is 1 / (n - 1) of the variance of what is left, and so of weight in short stacks.
+    frames it is 1 / (n - 1) of the residual's variance, and so matters in short stacks.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def slow_part(average: Array) -> tuple[Estimate, Array]:
 
 
 def _cosines(length: int, count: int) -> Array:
-    """Return cosines of unit mean square over so many pixels (length, count)."""
+    """Return cosines of unit mean square over `length` pixels (length, count)."""
     waves = np.cos(np.pi / length * np.outer(np.arange(length) + 0.5, np.arange(count)))
     waves[:, 1:] *= math.sqrt(2)
     return waves

@@ -1,4 +1,4 @@
-"""What a fit rests on, as plots: photon transfer, dark signal, and how sure each number is."""
+"""Plots of a fit: photon transfer, dark signal, and confidence intervals."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def draw_photon_transfer(path: Path, found: Fit) -> None:
         axes.set_xlabel("mean above dark [DN]")
         axes.set_ylabel("temporal variance above dark [DN²]")
         axes.legend()
-        axes.set_title("Photon transfer; lines are the gain, as far as it is fitted")
+        axes.set_title("Photon transfer; lines: fitted gain, over the fitted range")
 
 
 def draw_dark_signal(path: Path, found: Fit) -> None:
@@ -69,7 +69,7 @@ def draw_dark_signal(path: Path, found: Fit) -> None:
         )  # fmt: skip
         lower.axhline(0, color=COLORS[1], linewidth=1)
         lower.set_xlabel("exposure time [ms]")
-        lower.set_ylabel("off the line [DN]")
+        lower.set_ylabel("nonlinearity residual [DN]")
 
 
 def draw_intervals(path: Path, found: Fit) -> None:
@@ -86,7 +86,7 @@ def draw_intervals(path: Path, found: Fit) -> None:
         axes.set_xscale("symlog", linthresh=1.0)
         axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
         axes.set_xlabel("90 % interval, relative to the value [%]")
-        axes.set_title("How sure each number is")
+        axes.set_title("90 % confidence intervals")
 
 
 def _unit(known: Parameter) -> str:

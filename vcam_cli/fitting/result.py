@@ -32,7 +32,7 @@ class Fit:
     """What an edge tells of the lens."""
 
     def value(self, name: str) -> float | None:
-        """Return an estimate, None where there is none."""
+        """Return an estimate, None without one."""
         return next((p.value for p in self.parameters if p.name == name), None)
 
     def report(self) -> dict[str, Any]:

@@ -152,7 +152,7 @@ class Transfer:
     bend: float = 0.0
     """How far the slope of the signal over the light may be off for its curve, relative."""
     bends: tuple[str, ...] = ()
-    """What the user is told of curves."""
+    """Notes on curves, for the user."""
 
     @property
     def saturated(self) -> Condition | None:
@@ -295,7 +295,7 @@ def _gain_spread(
     found: Conditions,
     line: Dark,
 ) -> tuple[float, float]:
-    """Return how far the mean gain of so many pixels and columns is from that of all sensors.
+    """Return the standard error of the mean gain of this number of pixels and columns.
 
     Beside it the relative variance of the gains of these pixels.
     """

@@ -86,7 +86,7 @@ class PixelMoments:
 def pixel_moments(frames: Array, good: Array) -> PixelMoments:
     """Return the moments of the good pixels, noise of frames, rows and columns taken out.
 
-    A mean over a row has a share of the pixel itself in it, which would go with it: what is left is
+    A mean over a row contains a share of the pixel itself, which the difference would lose: it is
     scaled up, as if each mean were that of the row's other pixels. A trap's step keeps its size so,
     and the noise of these means is that of all pixels, which is known.
 
@@ -204,7 +204,7 @@ def _histogram(variance: Array, third: Array) -> Array:
 def _values(place: Array, frames: int) -> tuple[float, float, float, float]:
     """Return core variance, fraction, mean step and occupancy, in units of the median pixel.
 
-    A trap that is filled, or empty, in less than one of so many frames is none that is seen again
+    A trap that is filled, or empty, in less than one of this number of frames is not seen again
     and again: a few rare steps in all pixels would look like it.
     """
     core, fraction, amplitude, occupancy = map(float, place)
@@ -234,7 +234,7 @@ def _probabilities(place: Array, frames: int, nodes: int = NODES) -> Array:
     plain = np.diff(np.concatenate([[0.0], chdtr(freedom, scaled), [1.0]]))
     filled = np.arange(frames + 1)
     share = binom.pmf(filled, frames, occupancy)
-    # Few noncentralities stand for all: between them the distribution is smooth.
+    # Few noncentralities suffice: between them the distribution is smooth.
     centers = np.concatenate([[0.0], np.geomspace(0.05, 4e4, nodes)])
     table = chndtr(scaled, freedom, centers[:, None])
     table = np.diff(np.concatenate([np.zeros((len(centers), 1)), table,

@@ -30,7 +30,7 @@ UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "inch": 25.4e-3}
 
 
 class GivenGlass(Model):
-    """A glass of which nd and Vd are known: n = A + B / l + C / l^3.5, on the normal line."""
+    """A glass given by nd and Vd: n = A + B / l + C / l^3.5, on the normal line."""
 
     nd: Annotated[float, Number(above=1, below=5)] = key("index at 587.6 nm", example=1.5168)
     vd: Annotated[float, Number(least=5, most=150)] = key(
@@ -47,7 +47,7 @@ class CatalogName(Model):
 
     name: Text = key("its name in the maker's catalog", example="F2")
     maker: Annotated[str, Choice("schott", "ohara", "hoya", "cdgm", "hikari", "other")] = key(
-        "whose catalog", example="schott"
+        "maker of the glass", example="schott"
     )
 
 
@@ -84,7 +84,7 @@ def _asphere(given: Any) -> tuple[float, ...]:
 
 
 class SurfaceRow(Model):
-    """A surface of a lens, and what lies behind it. Lengths in the table's `unit`."""
+    """A surface of a lens and the medium behind it. Lengths in the table's `unit`."""
 
     radius: Annotated[
         float,
@@ -159,7 +159,7 @@ class LensTable(FileModel):
         "half the stop's diameter, in `unit`", example=14.1, default=None
     )
     field: Annotated[float | None, Quantity("angle", above=0, below=math.pi / 2)] = key(
-        "half the field angle that it is designed for", example="14 deg", default=None
+        "half the design field angle", example="14 deg", default=None
     )
     surfaces: Annotated[tuple[SurfaceRow, ...], Either(_rows, list[SurfaceRow])] = key(
         "from the object to the image", example=[{"radius": 40.94, "thickness": 8.74, "stop": True}]

@@ -74,7 +74,7 @@ class FieldWavefronts:
         return np.asarray(np.abs(box) * middle[:, 0] * middle[:, 1])
 
     def at(self, place: int) -> PlaceWavefront:
-        """Return what is known of one image point."""
+        """Return the wavefronts of one image point."""
         return PlaceWavefront(self, place)
 
 
@@ -175,7 +175,7 @@ def trace_field(
     heights : ndarray
         Distances of the image points from the axis (F,) [m].
     shortest, longest : float
-        Range of wavelengths that will be asked for [m].
+        Range of wavelengths that will be evaluated [m].
     vignetted : bool
         Whether the apertures that the file fixes clip, besides the stop.
 

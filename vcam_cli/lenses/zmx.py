@@ -202,17 +202,21 @@ class _Reader:
         """Return the lens, once all lines are in."""
         if len(self.surfaces) < 3:
             message = "ends before its image plane" if self.surfaces else "has no surfaces"
-            raise self.fail(0, message, "give a whole .zmx file")
+            raise self.fail(0, message, "give a complete .zmx file")
         if not self.unit:
             raise self.fail(0, "has no UNIT line", "add for example UNIT MM")
         first, *middle, last = self.surfaces
         for number, surface in enumerate(middle):
             if not math.isfinite(surface.thickness):
                 where = f"surface {number + 1} is infinitely thick"
-                raise self.fail(surface.line, where, "is the file whole?")
+                raise self.fail(surface.line, where, "check that the file is complete")
         if last.curvature or last.glass != AIR or math.isinf(last.thickness):
-            where = "its last surface is no plane in air, so that no image plane is known"
-            raise self.fail(last.line, where, "is the file whole? curved images are not simulated")
+            where = "its last surface is no plane in air, and defines no image plane"
+            raise self.fail(
+                last.line,
+                where,
+                "check that the file is complete; curved image surfaces are not simulated",
+            )
         if math.isfinite(first.thickness):
             self._say("the object distance is that of scene.distance, not the file's")
         surfaces = tuple(self._surface(surface) for surface in middle)
@@ -305,7 +309,7 @@ def read(file: Path, given: Mapping[str, Glass]) -> Prescription:
     Raises
     ------
     BadInput
-        For a file that is none, or has what cannot be traced, with the line.
+        For another file, or an element that cannot be traced, with the line.
     OSError
         Where it cannot be read.
     """

@@ -229,7 +229,7 @@ def grid_bytes(wavelengths: Floats, terms: Terms) -> int:
     Parameters
     ----------
     wavelengths : ndarray
-        Wavelengths (J,) at which `otf_ratio` is asked for [m].
+        Wavelengths (J,) at which `otf_ratio` is evaluated [m].
     terms : Terms
         Noll indices and coefficients [m] of the wavefront.
 

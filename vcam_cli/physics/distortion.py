@@ -17,7 +17,7 @@ from vcam_cli.arrays import Array
 
 STEPS = 16
 """Steps from the axis outwards in which a mapping is inverted, each from the one before: so a place
-beyond a fold is told from one that is reached without crossing it."""
+beyond a fold is distinguished from one that is reached without crossing it."""
 NEWTON = 12
 """Iterations of Newton's method in a step, at most."""
 NEAR, CLOSE = 1e-4, 1e-13

@@ -78,7 +78,7 @@ def pupil_harmonics(terms: Terms, wavelengths: Array, slope: float) -> PupilHarm
     terms : Terms
         Noll indices and coefficients [m] of the wavefront, without tilt.
     wavelengths : ndarray
-        Wavelengths (J,) between whose ends it will be asked for [m].
+        Wavelengths (J,) between whose ends it will be evaluated [m].
     slope : float
         Largest slope of the wavefront [m per pupil radius].
 

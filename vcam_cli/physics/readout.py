@@ -221,7 +221,7 @@ def saturation_speed(saturation_exposure: ArrayLike) -> Floats:
 def dynamic_range_db(
     well_capacity: ArrayLike, dark_electrons: ArrayLike, read_variance: ArrayLike
 ) -> Floats:
-    """Return the dynamic range: largest unsaturated signal over noise in the dark, eq 3.1 of [1].
+    """Return the dynamic range: largest unsaturated signal over the dark noise, eq 3.1 of [1].
 
     DR = 20 log10[(q_max - i_dc t) / sqrt(sigma_r^2 + i_dc t)], all in electrons.
 

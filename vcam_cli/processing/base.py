@@ -1,7 +1,7 @@
 """What processing works on: the context of a frame, blocks of its rows, operations on them.
 
 A frame is worked on in blocks of some rows that pass through all operations while they are in the
-cache; an operation that looks at neighbors asks for a `halo` of rows above and below. Blocks are
+cache; an operation on neighbors declares a `halo` of rows above and below. Blocks are
 the same whatever the number of workers, and so are the bytes that come out.
 
 Why an operation has two faces: the ideal image has all colors at every pixel and no mosaic, but
@@ -99,7 +99,7 @@ class Context:
     saturated_dn: float = np.inf
     """Code from which on a pixel is saturated [DN]."""
     patches: Callable[[], Patches] | None = None
-    """Gives the ColorChecker as this camera sees it; called only where a step asks for it."""
+    """Gives the ColorChecker as this camera sees it; called only where a step needs it."""
     primaries: Callable[[], np.ndarray] | None = None
     """Gives the signal (C, 3) of the primaries of a picture that emits, as `white_dn` [DN]."""
     planes: bool = False

@@ -66,7 +66,7 @@ def check(
     colors : sequence of str
         Colors of the array.
     quality : sequence of str
-        Metrics asked for; they need all colors at every pixel.
+        Requested metrics; they need all colors at every pixel.
     planes : bool
         Whether every pixel has all its colors.
     scattered : bool

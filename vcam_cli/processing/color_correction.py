@@ -6,16 +6,16 @@ with white balanced. Their colors are those a CIE 1931 observer sees under the s
 to the display's white D65 by the linear Bradford transform [1].
 
 White stays neutral exactly: every row maps the camera's white to 1, and least squares runs over
-what is left free [2]. What is squared is the difference in CIELAB [3], by its slope at each patch's
+the free coefficients [2]. The residual is the difference in CIELAB [3], linearized at each patch's
 color: a linear problem, solved at once. Why not in linear light: there bright patches count most.
 Over seven lights and the two filter sets that ship, the mean CIEDE2000 is 0.85 (largest of a patch,
 mean over these: 2.8), against 0.88 (3.2) in linear light; iterating to the least CIELAB
 differences themselves gives 0.85 (2.8) again.
 
-Where colors cannot be told apart (monochromatic light, two filters alike) the patches say nothing
-about some of the matrix. A weak pull towards the identity, worth half a unit of Delta E a patch,
-decides there and nowhere else, and keeps the coefficients, which amplify noise, from growing
-without bound. Where a color sees no light at all, the identity is all there is.
+Where colors cannot be distinguished (monochromatic light, two equal filters) the patches leave
+part of the matrix undetermined. A weak pull towards the identity, worth half a unit of Delta E a
+patch, decides there and nowhere else, and keeps the coefficients, which amplify noise, from
+growing without bound. Where a color sees no light at all, the matrix is the identity.
 
 References
 ----------
@@ -161,7 +161,7 @@ def fit_primaries(signals: np.ndarray, balanced: bool) -> Fit:
     return Fit(matrix if balanced else matrix * (white.max() / white), note)
 
 
-_FILTERS_ALIKE = "under this light these filters tell too few colors apart"
+_FILTERS_ALIKE = "under this light these filters distinguish too few colors"
 
 
 def fit_relative(signals: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, int]:
@@ -179,7 +179,7 @@ def fit_relative(signals: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, i
     matrix : ndarray
         Coefficients (3, C) with rows that sum to 1.
     rank : int
-        Number of colors that can be told apart.
+        Number of colors that can be distinguished.
     """
     count = signals.shape[1]
     start = np.eye(3, count)

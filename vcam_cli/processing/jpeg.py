@@ -43,7 +43,7 @@ class Compression:
     quality: int
 
     def __call__(self, codes: np.ndarray) -> np.ndarray:
-        """Return what is left of a render's codes."""
+        """Return a render's codes after compression."""
         return decompress(self.file(codes))
 
     def file(self, codes: np.ndarray) -> bytes:

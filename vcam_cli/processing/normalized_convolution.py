@@ -1,6 +1,6 @@
 """Demosaicing of any repeating pattern by normalized convolution.
 
-Each color's samples, zero where there is none, and the map of where there are some are convolved
+Each color's samples, zero at other sites, and the mask of its sites are convolved
 with the same tent; their ratio is the mean of the samples around, the near ones weighing most [1].
 Each color's tent reaches from sample to sample. Of a Bayer mosaic this is bilinear interpolation.
 Measured values are left as they are; beyond the border there is nothing.
@@ -57,7 +57,7 @@ def half_width(pattern: Pattern, color: str) -> int:
 
 
 def _every_window_has_site(here: np.ndarray, width: int) -> bool:
-    """Return whether every square window of so many pixels has a site."""
+    """Return whether every square window of `width` pixels has a site."""
     shifts = [(i, j) for i in range(width) for j in range(width)]
     return bool(np.any([np.roll(here, shift, axis=(0, 1)) for shift in shifts], axis=0).all())
 
@@ -216,7 +216,7 @@ def tent(values: np.ndarray, width: int, axes: tuple[int, ...] = (0, 1)) -> np.n
 
 
 def _sums(values: np.ndarray, count: int, axis: int) -> np.ndarray:
-    """Return the sums of so many values that follow each other along an axis."""
+    """Return the sums of consecutive values along an axis."""
     lines = values if axis == 0 else values.T
     size = len(lines) - count + 1
     out = lines[:size].copy() if count == 1 else lines[:size] + lines[1 : size + 1]

@@ -1,4 +1,4 @@
-"""The picture after processing: computed when it is asked for, block of rows by block of rows."""
+"""The picture after processing: computed on request, block of rows by block of rows."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ class ProcessedPicture:
     dn: np.ndarray
     """Frame (rows, columns) [DN], or (C, rows, columns) where every pixel has all its colors."""
     context: Context
-    """What is known of the camera."""
+    """The camera's data."""
     operations: tuple[Operation, ...]
     """What is applied to the frame, in this order."""
     curve: tone.Curve
@@ -120,8 +120,8 @@ class ProcessedPicture:
     def ideal(self, planes_dn: np.ndarray) -> np.ndarray:
         """Return the ideal image in the colors and scale of `linear`.
 
-        The gains are those found on the camera's picture. What black the steps leave in that (dark
-        signal, offset) is the camera's fault and no part of the scene: there is none here.
+        The gains are those found on the camera's picture. The black that the steps leave in that
+        (dark signal, offset) is an error of the camera, not of the scene, and is left out here.
 
         Parameters
         ----------

@@ -36,7 +36,7 @@ class Remosaic:
         """Return the block as a Bayer mosaic, mirrored beyond the frame as one is."""
         found = self.interpolation.process_block(block)
         rows = found.first_row + np.arange(found.planes.shape[1])
-        # A mirrored quad-Bayer mosaic is none: rows beyond the border come from inside again.
+        # A mirrored quad-Bayer mosaic is not one: rows beyond the border come from inside again.
         inside = np.clip(mirrored_index(rows, self.rows) - found.first_row, 0, len(rows) - 1)
         planes = found.planes[:, inside]
         mosaic = np.empty_like(planes[:1])

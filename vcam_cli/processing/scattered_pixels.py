@@ -11,7 +11,7 @@ of the samples would have to add up to more than `MAX_WEIGHT_SUM` without their 
 
 Why this one: PSNR [dB] of a chart of rings, colors and edges on 128 x 128 pixels; the honeycomb
 with rows half a column apart, the Bayer mosaic with each pixel moved by up to 0.4 and its color
-changed for another's at random. Tents reach as far as R, and have the number of samples
+changed for another's at random. Tents reach to R, and have the number of samples
 that suits them best of 4 to 12.
 
                                    honeycomb   moved
@@ -138,7 +138,7 @@ class Samples:
         reach = distance[:, -1:] if found > count else 2 * distance[:, -1:]
         reach = np.maximum(reach, np.finfo(float).tiny)
         index = index[:, :count]
-        # Samples as far as R have no weight: which of them are among the eight does not matter.
+        # Samples at the distance R have no weight: it does not matter which are among the eight.
         near = np.clip(distance[:, :count] / reach, _NEAR, 1 - _NEAR)
         weight = (1 / near - 1) ** 2
         weight /= _sum(weight)

@@ -8,7 +8,7 @@ the steps before it left it. A last operation scales the picture so that the sce
 under this exposure has luminance 1: the white passes through the same steps.
 The exposure is known, so the scale never depends on the brightest pixel of the picture.
 
-Nothing is computed before it is asked for: `ProcessedPicture` holds the raw frame and the
+Values are computed on request: `ProcessedPicture` holds the raw frame and the
 operations.
 """
 
@@ -64,7 +64,7 @@ def process(
         Raw frame (rows, columns) [DN]; (C, rows, columns) where every pixel has all its colors;
         scattered pixels in the shape of their layout.
     context : Context
-        What is known of the camera.
+        The camera's data.
     steps : sequence of Step
         Steps in the user's order.
     workers : int
@@ -73,7 +73,7 @@ def process(
     Returns
     -------
     ProcessedPicture
-        The picture, which is computed when it is asked for.
+        The picture, which is computed on request.
 
     Raises
     ------
@@ -126,7 +126,7 @@ def _black_level(draft: Draft, step: Step, path: Path) -> Draft:
     if step.value != "subtract" and level >= white > context.black_dn:
         raise bad(
             path,
-            f"{level:g} DN leaves nothing of the perfect white, which is {white:g} DN",
+            f"{level:g} DN is not below the perfect white, which is {white:g} DN",
             "write `subtract`, or a smaller number",
         )
     if context.linearize is not None:
@@ -233,7 +233,7 @@ def _color_correction(draft: Draft, step: Step, path: Path) -> Draft:
         correction = color_correction.ColorCorrection(step.value.matrix)
         after = _luminance(correction.process_colors(white), color_correction.DISPLAY)
         if after <= 0 < white.max():
-            raise bad(path, "this matrix leaves nothing of white", "let its rows add up to about 1")
+            raise bad(path, "this matrix maps white to 0 or less", "let its rows add up to about 1")
     ceilings = draft.apply_to_colors(np.full(len(white), context.saturated_dn))
     recover = (Highlights(tuple(ceilings.tolist())),) if np.isfinite(ceilings).all() else ()
     return replace(
@@ -279,7 +279,7 @@ def _sharpen(draft: Draft, step: Step, path: Path) -> Draft:
 def _lens_distortion(draft: Draft, step: Step, path: Path) -> Draft:
     correction = draft.context.correction
     if correction is None:
-        note = "lens_distortion: there is none to correct"
+        note = "lens_distortion: skipped, the lens has no distortion"
         return replace(draft, notes=(*draft.notes, note))
     return draft.with_operations(lens_distortion.Undistort(correction, draft.dn.shape[-2]))
 
@@ -365,7 +365,7 @@ def _black_signal(draft: Draft) -> np.ndarray:
 
 
 NO_SIGNAL = 1e-12
-"""White below which there is none [DN]: what it would be scaled by ends 32-bit numbers."""
+"""White below which there is no signal [DN]: scaling by it would overflow 32-bit numbers."""
 LUMINANCE = {"R": 0.2126, "G": 0.7152, "B": 0.0722}
 """Shares of the display's primaries in luminance, ITU-R BT.709; any other color counts fully."""
 

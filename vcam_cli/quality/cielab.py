@@ -80,7 +80,7 @@ def delta_e(color: Array, reference: Array, formula: Formula = "1976") -> Array:
     Raises
     ------
     ValueError
-        The shapes differ, or the formula is none of these.
+        The shapes differ, or the formula is unknown.
     """
     if color.shape != reference.shape or color.shape[:1] != (3,):
         raise ValueError(f"two arrays (3, ...) of one shape, not {color.shape}, {reference.shape}")

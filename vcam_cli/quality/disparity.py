@@ -16,7 +16,7 @@ WINDOW = 15
 """Pixels along the side of a window."""
 LEAST_DETAIL = 25.0
 """Least mean square of differences of neighbors in a window, over that of their noise, at which a
-shift can be told: below it a window's best shift is that of its noise."""
+shift can be measured: below it a window's best shift is that of its noise."""
 
 
 def disparity(left: Array, right: Array, most: int, noise: Array | float = 0.0) -> Array:

@@ -1,4 +1,4 @@
-"""False colors for a map of differences: black where there is none, light yellow where it is large.
+"""False colors for a map of differences: black for 0, light yellow for large ones.
 
 The colors are ten points of matplotlib's `inferno` (S. van der Walt, N. Smith, 2015, CC0), straight
 between: lightness rises steadily, so the map reads right in gray and for color-blind eyes.

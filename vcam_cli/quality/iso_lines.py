@@ -129,7 +129,7 @@ def level_heights(values: Array, scale: Array, level: float) -> Array:
     values : ndarray
         Averaged map (rows, columns).
     scale : ndarray
-        What the rows stand for, rising (rows,); straight between them.
+        Values of the rows, rising (rows,); linear between them.
     level : float
         Level in the unit of the map.
 

@@ -1,6 +1,6 @@
 """Modes of a distribution: how many maxima its density has, and how surely it has one.
 
-A mean stands for a distribution that has one mode. How many a density has depends on how finely
+A mean describes a distribution that has one mode. How many a density has depends on how finely
 one looks: it is smoothed by a Gaussian, whose width is Silverman's rule of thumb, and its maxima
 are counted. The critical width is the least from which on there is a single one [1]; a
 distribution is the more surely unimodal the less of its spread that is.

@@ -169,7 +169,7 @@ def _is_upright(lattices: Sequence[Lattice]) -> bool:
         across += abs(float(v[:, -1].mean() - v[:, 0].mean()))
         down += abs(float(v[-1].mean() - v[0].mean()))
     if not max(across, down) > 0:
-        raise ValueError("there is no edge: all sides are alike")
+        raise ValueError("no edge: all sides have the same signal")
     return across >= down
 
 
@@ -284,7 +284,7 @@ def _sfr_of_profile(profile: Floats, width: float) -> tuple[Floats, Floats]:
     used = frequency * width < MAX_FREQUENCY
     f = frequency[used] * width
     if not spectrum[0] > 0:
-        raise ValueError("there is no edge: both sides are alike")
+        raise ValueError("no edge: both sides have the same signal")
     return frequency[used], spectrum[used] / spectrum[0] / (np.sinc(2 * f) * np.sinc(f))
 
 

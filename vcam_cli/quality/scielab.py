@@ -12,7 +12,7 @@ Why blocks of rows, with the rows above and below that the filter reaches: they 
 threads share them, and memory does not grow with the picture. They are the same for any number of
 workers, and so is every byte of the result.
 
-The filters `continuous` see pixels as squares of light, and what is seen changes within a square
+The filters `continuous` see pixels as squares of light, and the seen light changes within a square
 where pixels are coarse. Each is then looked at in several places, as if it were several pixels of
 the same light, and its Delta E is the mean. A pixel of more than a degree is seen across its
 borders like one of a degree, since the filters end half a degree away; all the rest of it is seen
@@ -139,7 +139,7 @@ def s_cielab_map(
 
 
 def needed_bytes(shape: tuple[int, int], screen: Screen, filters: Filters, workers: int) -> int:
-    """Return the memory that S-CIELAB takes with so many threads, but for the pictures.
+    """Return the memory that S-CIELAB takes with `threads` threads, without the pictures.
 
     With little memory fewer threads run; one is needed.
 
@@ -228,7 +228,7 @@ class _Places:
         return averages
 
     def needed_bytes(self, dtype: np.dtype, workers: int) -> int:
-        """Return the memory that it takes with so many threads."""
+        """Return the memory that it takes with `threads` threads."""
         values = math.prod(self.transformed) * dtype.itemsize
         threads = min(workers, -(-self.shape[0] * self.along // self.block))
         return values * (3 + THREAD_BYTES * threads)

@@ -87,9 +87,9 @@ def _level(auto: AutoExposure, rate: Array, white_rate: float) -> float:
 
 
 def ceiling(exposure: Exposure, white_rate: float, saturation: float) -> float:
-    """Return the photo rate that fills a pixel, as far as it is known before the light is.
+    """Return the photo rate that fills a pixel, where it is known before the light is.
 
-    A given exposure time determines it; of several samples the last, which asks for the finest
+    A given exposure time determines it; of several samples the last, which needs the finest
     detail. An automatic exposure is estimated by that of the perfect white, or by its longest time.
 
     Parameters

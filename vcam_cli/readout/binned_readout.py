@@ -1,4 +1,4 @@
-"""Readout of pixels that are read as one: where each effect acts, and what noise is left.
+"""Readout of pixels that are read as one: where each effect acts, and the noise after it.
 
 `binning.py` says which pixels these are and what of theirs is joined.
 """

@@ -158,7 +158,7 @@ class ReadoutChain:
 
     @property
     def metered(self) -> Electrical:
-        """Well and ADC that exposure goes by: of several readouts the large photodiode's first."""
+        """Well and ADC that set the exposure: of several readouts the large photodiode's first."""
         return self.branches[0].circuit if self.branches else self.circuit
 
     @property

@@ -1,7 +1,7 @@
 """The times at which a camera samples one integration, where it chooses them for its scene.
 
-`captures: {schedule: optimal, count: 8, max: 100 ms}` asks for the times whose mean SNR over the
-pixels is largest, of all of at most that length. The camera plans with what it has: the noise-free
+`captures: {schedule: optimal, count: 8, max: 100 ms}` takes the times of the largest mean SNR over
+the pixels, up to the time `max`. The camera plans with what it has: the noise-free
 photocurrents of its pixels, its full well or the end of its ADC, whichever comes first, and its
 dark current, readout and reset noise, as the file describes them; so a schedule does not depend on
 which effects a plan leaves out.
@@ -58,7 +58,7 @@ def choose_sample_times(
     Parameters
     ----------
     exposure : Exposure
-        What the file says of the exposure: times, or a schedule that it asks for.
+        The file's exposure: times, or a requested schedule.
     rate : Array
         Photo-electrons per second of every pixel, of any shape [e/s].
     chain : ReadoutChain
@@ -68,7 +68,7 @@ def choose_sample_times(
     -------
     tuple of float
         Times, rising [s]; empty where there is a single exposure. Scheduled samples are as many as
-        asked for, fewer where more would coincide.
+        requested, fewer where more would coincide.
     """
     asked = exposure.schedule
     if asked is None:

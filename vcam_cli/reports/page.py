@@ -43,7 +43,7 @@ class Picture:
     group: str = ""
     """Pictures of one group show the same place and are zoomed together; "" for no zoom."""
     far: str = ""
-    """What stands for it until it is zoomed: cells of a mosaic averaged, which would beat with the
+    """Its replacement until it is zoomed: cells of a mosaic averaged, which would beat with the
     screen's pixels; "" for the picture itself."""
 
 
@@ -57,7 +57,7 @@ class Table:
     rows: Sequence[Sequence[object]]
     note: str = ""
     folded: bool = False
-    """Whether it opens only when it is asked for."""
+    """Whether it is folded at first."""
     numbers: frozenset[int] = frozenset()
     """Indices of the columns of numbers, which end at one line."""
     marked: frozenset[int] = frozenset()

@@ -116,7 +116,7 @@ def map_picture(
 
 
 def _averaged(image: Array, step: int) -> Array:
-    """Return means of squares of `step` pixels, what is left at the ends dropped."""
+    """Return means of squares of `step` pixels, the remainder at the ends dropped."""
     if step <= 1:
         return image
     rows, columns = (size // step for size in image.shape[:2])

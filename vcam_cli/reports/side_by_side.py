@@ -13,7 +13,7 @@ from vcam_cli.reports.page import Page, Part, Picture, Section, Table, number_co
 from vcam_cli.reports.run_facts import exposure_rows, geometry_rows, number, spoken
 
 SHOWN = {"render.png": "Renders", "delta_e.png": "Errors"}
-"""File of a run -> what it is called."""
+"""File of a run -> its heading."""
 Runs = Sequence[tuple[str, Path, Mapping[str, Any]]]
 """Label, folder and record of each run."""
 
@@ -55,7 +55,7 @@ def _page(runs: Runs) -> Page:
     labels = [label for label, _, _ in runs]
     return Page(
         title=" and ".join(labels) if len(labels) < 4 else f"{len(labels)} runs",
-        about="Runs side by side. What differs stands out.",
+        about="Runs side by side. Differences are highlighted.",
         notes=list(_notes(runs)),
         sections=(
             *(Section(title, list(_pictures(runs, name))) for name, title in SHOWN.items()),

@@ -6,7 +6,7 @@ upright: magnification's two reversals are left out, the top of the scene is row
 
 Why three kinds of scene: sinusoids (`waves.py`) and charts that repeat (`HarmonicScene`) are known
 in closed form and stay exact, all else is samples.
-`SampledScene.planes(mix)` paints as many mixtures of 25 spectra as the camera asks for.
+`SampledScene.planes(mix)` paints as many mixtures of 25 spectra as the camera needs.
 """
 
 import math
@@ -256,7 +256,7 @@ class SampledScene(ABC):
         ceiling : float
             Rate that fills a pixel [e/s].
         allowed : float
-            Change over full signal that matters: larger ones need not be told apart from inf.
+            Change over full signal that matters: larger ones need not differ from inf.
 
         Returns
         -------

@@ -106,7 +106,7 @@ def chart_and_reflectances(source: object, view: View) -> tuple[Chart, tuple[Spe
 
 
 def _waves(source: object) -> tuple[Wave, ...] | None:
-    """Return the source as waves; None where it is none."""
+    """Return the source as waves; None for another source."""
     match source:
         case charts.Uniform():
             return uniform.waves(source.reflectance)
@@ -251,7 +251,7 @@ def _wrong_channels(model: str, given: int, needed: int) -> BadInput:
             "reflectance needs one channel, but this image has three",
             "use one of the models for colors (mallett, laser, rgb-display), or a gray image",
         )
-    remedy = f"use an image with channels R, G, B; {model} takes no other"
+    remedy = f"use an image with channels R, G, B; {model} accepts no other"
     if given == 1:
         remedy = "write model: reflectance, or use an image with channels R, G, B"
     elif needed == 1:

@@ -11,8 +11,8 @@ How wide the spacing may be, the picture's own power spectrum tells: a picture w
 the same at any distance.
 
 Behind a sample with farther ones beside it, so near that rays through the aperture pass it, what
-the picture does not show goes on as the nearest of these: its light and its distance. What that
-guess is worth is told by another one, the picture's mirror image at the edge.
+the picture does not show goes on as the nearest of these: its light and its distance. A second
+guess, the picture's mirror image at the edge, estimates its error.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ BETWEEN = 0.73
 LEAST_JUMP = 0.1
 """Difference of blur radii from which on one sample hides another [pixels]."""
 STEPS = 24
-"""Groups of radii, each of which is searched at once for what lies behind it."""
+"""Groups of radii, each searched at once for the background behind it."""
 EDGE = 1.0
 """Samples by which the middles of those at an edge are apart."""
 FEW = 10_000

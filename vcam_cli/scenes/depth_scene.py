@@ -230,7 +230,7 @@ class DepthScene:
         Returns
         -------
         CutLayer
-            What is seen of it.
+            Its visible part.
         """
         rows, columns = (np.arange(count) for count in self.depth.shape)
         return self._layer(self.cut.coverage(number, rows, columns), None)

@@ -25,8 +25,8 @@ from vcam_cli.physics.aberration import paraboloid_transfer
 from vcam_cli.scenes.depth_detail import Detail, block_means
 
 STEEPEST = 1.0
-"""Difference of the radii of samples side by side from which on they are no slope, whatever else
-says so: it would fold under the rays [samples]."""
+"""Difference of the radii of samples side by side from which on they are no slope under any
+other criterion: it would fold under the rays [samples]."""
 MOST_FINE = 16
 """Samples along a pixel's side into which samples are divided, at most."""
 RIGID = 1.2
@@ -62,7 +62,7 @@ def slopes(radius: Array) -> tuple[Array, Array]:
 
 
 def divided(radius: Array, count: int) -> Array:
-    """Return the radius on so many parts along the sides of samples.
+    """Return the radius on `count` parts along the sides of samples.
 
     On slopes it is straight between the middles of samples.
 

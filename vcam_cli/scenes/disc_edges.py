@@ -1,7 +1,7 @@
-"""Cells crossed by the edges of opaque discs: what is seen in each, and its average color.
+"""Cells crossed by the edges of opaque discs: visible discs in each, and their average color.
 
 A cell crossed by one visible edge takes the exact area of the circle within the cell. Cells
-crossed by more are divided in four, again and again, and the discs in what is left are then taken
+crossed by more are divided in four, again and again, and the discs in the rest are then taken
 as independent. So there is an error in cells where edges meet, and rounding elsewhere; how often
 cells are divided is chosen by it (`divisions`).
 """
@@ -106,7 +106,7 @@ class CrossedCells:
 
 @dataclass(frozen=True)
 class EdgeShares:
-    """What is seen in cells that edges cross: labels, and the part of the cell that each fills."""
+    """Visible discs in cells that edges cross: labels, and the part of the cell that each fills."""
 
     single: Array
     """Whether one edge alone crosses a cell (m,)."""
@@ -154,7 +154,7 @@ class EdgeShares:
 
 
 def edge_shares(discs: Discs, cells: CrossedCells, divided: int = MOST) -> EdgeShares:
-    """Return what is seen in crossed cells.
+    """Return the visible discs in crossed cells.
 
     Parameters
     ----------
@@ -282,7 +282,7 @@ def _squared_distances(low: Array, high: Array) -> tuple[Array, Array]:
 
 
 def _layer_shares(discs: Discs, parts: _Parts) -> tuple[Array, Array]:
-    """Return what is seen of each edge's disc, and of what lies behind all, as parts of 1.
+    """Return the visible shares of each edge's disc, and of the background, as parts of 1.
 
     From the front, a disc is seen in its own share of what those before it leave free: exact
     where the edges are independent. Pairs (p,) and parts (m,).

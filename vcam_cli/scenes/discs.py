@@ -41,7 +41,7 @@ class Coverage:
     column: Array
     """Their columns (m,)."""
     shares: disc_edges.EdgeShares | None
-    """What is seen in those; None where there are none."""
+    """Visible discs in those; None where there are none."""
 
     @property
     def nbytes(self) -> int:

@@ -16,7 +16,7 @@ from vcam_cli.arrays import Array
 
 RINGING = 0.1
 """Part of an edge's height by which light beside it may err: edges between two lights that both
-fill pixels count as far as that may leave one of them not full."""
+fill pixels count up to the error that would leave one of them unsaturated."""
 
 
 @dataclass(frozen=True)

@@ -195,11 +195,11 @@ def check_bands(scene: Scene, bands: Bands) -> None:
     if bands.quantity == "reflectance" and asked and not (asked == ["irradiance"] and lit):
         raise bad(
             ("scene", asked[0]),
-            "the file holds reflectances, which have no level of their own",
+            "the file holds reflectances, which have no absolute level",
             "write for example luminance: 100 cd/m2",
         )
     if bands.quantity == "radiance" and asked == ["irradiance"]:
-        message = "the file holds radiances, and no irradiances"
+        message = "the file holds radiances, not irradiances"
         raise bad(("scene", "irradiance"), message, "write luminance: from-file")
 
 
@@ -219,7 +219,7 @@ def check_place(bands: Bands, has_lens: bool) -> None:
         If the file holds irradiances, and there is a lens.
     """
     if bands.quantity == "irradiance" and has_lens:
-        message = "the file holds irradiances on a sensor, which no lens has before it"
+        message = "the file holds irradiances on a sensor, and needs optics: none"
         raise bad(FILE, message, "write optics: none, or give a file of radiances")
 
 

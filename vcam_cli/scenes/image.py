@@ -1,7 +1,7 @@
 """An image file as a scene: every sample a uniform square of light on the sensor plane.
 
 A scene that covers the sensor is centered, and scaled by one factor until it does (never
-stretched). Beyond the array it goes on as far as blurs reach, to the whole samples that array and
+stretched). Beyond the array it continues to the reach of blurs, to the whole samples that array and
 margin touch. A scene with a width of its own is scaled to that width and centered, with black
 samples around it until array and margin are covered.
 """
@@ -147,7 +147,7 @@ class ImageScene(SampledScene):
         return rows, self._samples_at(x, self.pitch_x, 1)[0]
 
     def divided(self, count: int) -> Self:
-        """Return the same light on samples of which so many lie along the side of one."""
+        """Return the same light on `count` samples along the side of one."""
         return replace(
             self,
             shape=(self.shape[0] * count, self.shape[1] * count),

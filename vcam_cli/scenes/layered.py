@@ -1,8 +1,8 @@
 """Layers of a scene, each with its light and its opacity, the nearest first.
 
 What a layer sends where it covers a part a of a place is a times its own light, and it lets the
-part 1 - a of the light behind it pass. Behind a lens both are blurred by what the layer's distance
-asks for, which is image formation's business; `flat` is the scene as a pinhole sees it.
+part 1 - a of the light behind it pass. Behind a lens both are blurred according to the layer's
+distance, by image formation; `flat` is the scene as a pinhole sees it.
 """
 
 import math
@@ -22,11 +22,11 @@ from vcam_cli.scenes.picture_chart import PictureChart
 from vcam_cli.spectra import Spectrum
 
 PARTS = 4
-"""Parts along each side of a pixel or of a larger cell, in each of which layers are put one before
-the other. How fine cells within pixels are to be is chosen by what they err, with this in it."""
+"""Parts along each side of a pixel or of a larger cell, in which layers are
+composited. The size of cells within pixels is chosen by their error, which includes this one."""
 MOST_BORDERS = 16
 """Borders of samples in a cell that divide it, at most, in the mean: then their light and opacity
-vary together by a sixteenth of what they are, of one in so many squared samples."""
+vary together by a sixteenth of their value, in one of this number of squared samples."""
 MOST_PARTS = 1 << 20
 """Parts of cells, about, that are held at once."""
 SAME = 1e-6
@@ -234,7 +234,7 @@ def _edges(edges: Array, cells: slice) -> Array:
 
 
 def _divided(edges: Array, borders: Array) -> Array:
-    """Return the edges of cells, those between so many parts of each, and borders within them."""
+    """Return the edges of cells, those between the parts of each, and borders within them."""
     steps = np.arange(PARTS) / PARTS
     parts = edges[:-1, None] + np.diff(edges)[:, None] * steps
     parts = np.append(parts.ravel(), edges[-1])
@@ -269,7 +269,7 @@ class LayeredScene:
 
     @property
     def brightest(self) -> float:
-        """Brightest light of all layers, relative to the perfect white; 1 where there is none."""
+        """Brightest light of all layers, relative to the perfect white; 1 without layers."""
         return max(part.brightest for part in self.parts) or 1.0
 
     @property

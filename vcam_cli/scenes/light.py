@@ -160,7 +160,7 @@ def scale_to_level(relative: Spectrum, scene: Scene) -> Spectrum:
 def visible_range(light: Spectrum, start: float, stop: float) -> tuple[float, float]:
     """Return the wavelengths over which luminance counts.
 
-    They are those simulated and all that is visible, as far as the light is known there.
+    They are those simulated and all that is visible, where the light is known.
 
     Parameters
     ----------

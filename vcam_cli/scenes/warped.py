@@ -34,8 +34,8 @@ by a quarter of what the box does, in second moments."""
 MOST_FINER = 8.0
 """Finer cells in a tile over its cells times `FINER` squared, at most: it is halved beyond."""
 POINTS = 4.0
-"""Points of a chart along the distance of the nearest ones that are asked for: between them its
-values are straight."""
+"""Points of a chart along the distance of the nearest requested ones: between them its
+values are interpolated linearly."""
 DEGREES = (16, 32, 64, 128)
 """Degrees of the series of a map that are tried."""
 PRECISE = 1e-11
@@ -151,7 +151,7 @@ class WarpedChart(Chart):
     sees: SmoothMap
     """Where places of the sensor look."""
     widest: float = math.inf
-    """Width of cells that boxes stand for, at most; wider ones are painted in parts [m]."""
+    """Largest width of cells represented by boxes; wider ones are painted in parts [m]."""
 
     edge_seconds = property(lambda self: self.chart.edge_seconds)
     undivided = property(lambda self: min(self.chart.undivided / self.sees.scales[1], self.widest))
@@ -209,7 +209,7 @@ class WarpedChart(Chart):
     def _paint_in_parts(
         self, x_edges: Array, y_edges: Array, mix: Array, out: Array, parts: int
     ) -> None:
-        """Write the means over so many parts along each side of every cell."""
+        """Write the means over `parts` parts along each side of every cell."""
         x, y = (
             np.interp(np.arange(parts * (len(e) - 1) + 1) / parts, np.arange(len(e)), e)
             for e in (x_edges, y_edges)

@@ -115,7 +115,7 @@ class WaveScene:
 
 
 def _mean_of_phasors(turns: float, count: int) -> float:
-    """Return the size of the mean of `count` phasors, each so many turns further."""
+    """Return the size of the mean of `count` phasors, each `turns` turns further."""
     step = math.sin(math.pi * turns)
     return 1.0 if abs(step) < 1e-12 else abs(math.sin(math.pi * turns * count) / (count * step))
 

@@ -196,7 +196,7 @@ def first_followers(begin: Floats, end: Floats, gap: float) -> Indices:
     Parameters
     ----------
     begin, end : (G,) arrays
-        Earliest and latest time that each candidate stands for [s].
+        Earliest and latest time that each candidate represents [s].
     gap : float
         Least time between two captures [s].
     """
@@ -313,7 +313,7 @@ def _interpolation(noise: Floats) -> tuple[Floats, Indices, Floats]:
 def _cumulative_integrals(pdf: Pdf, times: Floats, sensor: Sensor, nodes: Floats) -> Floats:
     """Return the integrals of i^2 / (i + c) f(i) up to each time's photocurrent, (G, blocks, P).
 
-    They are summed from the dark end, where a schedule asks for the smallest differences.
+    They are summed from the dark end, where a schedule needs the smallest differences.
     """
     limits = saturation_limits(pdf, times, sensor)
     low, high, probability = split_segments(pdf, limits)

@@ -30,7 +30,7 @@ LAMBDAS = 10.0 ** np.arange(-2, 9)
 """Penalties that are tried [5]."""
 NEWTON_STEPS, CONVERGED = 60, 1e-9
 LEAST_MEAN = 1e-12
-"""Expected pixels of a bin, of all of them, below which a bin counts as so many."""
+"""Least expected pixels of a bin, of all of them; fewer count as this number."""
 BLOCK = 256
 """Columns of an inverse that are computed at once."""
 

@@ -80,7 +80,7 @@ def least_bounds(
 def flow_bounds(
     pdf: Pdf, counts: Sequence[int], sensor: Sensor, constraints: Constraints
 ) -> dict[int, float]:
-    """Return the mean SNR that no schedule of so many captures at whole frames exceeds.
+    """Return the mean SNR that no schedule of a number of captures at whole frames exceeds.
 
     Parameters
     ----------
@@ -251,7 +251,7 @@ def _end_frames(ends: Indices, early: int, late: int) -> Indices:
 def _filter(times: Floats, reads: Floats, rate: Floats, sensor: Sensor) -> tuple[Floats, Floats]:
     """Return the precision t' (K + read^2 / X)^-1 t, and t - K w at each time.
 
-    A Kalman filter of the charge's noise and, backward, its smoother; a read of 0 is none.
+    A Kalman filter of the charge's noise and, backward, its smoother; a read of 0 is skipped.
 
     Parameters
     ----------

@@ -139,7 +139,7 @@ def _upper_bounds(
     constraints: Constraints,
     most: int,
 ) -> Floats | None:
-    """Return (most,) mean SNR that no schedule of so many captures exceeds; None: the chains' own.
+    """Return (most,) bound of the mean SNR by number of captures; None: the chains' own.
 
     Moving captures to candidates may break a least gap: the bound then allows what the begins and
     ends of their cells allow.

@@ -3,8 +3,8 @@
 This is the method of [1]_, section 4.4, where ten random starts agreed with a brute-force search.
 Over a piecewise-uniform pdf E[SNR] is a difference of convex functions of the captures'
 photocurrents with many local maxima: captures in one segment have no gradient towards another, nor
-across a gap, and a search over all photocurrents at once ends in one of them. With so many captures
-assigned to each segment, and every such assignment searched, as [1]_ has it, few starts are left to
+across a gap, and a search over all photocurrents at once ends in one of them. As in [1]_, the
+number of captures of each segment is fixed, and every such assignment searched: then few starts
 disagree. `shot_noise.optimal_schedules` finds the best of all, and certifies it.
 
 References

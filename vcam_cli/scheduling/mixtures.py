@@ -16,8 +16,8 @@ def best_mixture(
 ) -> Floats:
     """Return shares of points that make value(mixture) + worth of the shares large.
 
-    Pairwise steps: what the worst point of the mixture has goes to the best one, as far as it
-    pays; a line search by bisection of the slope.
+    Pairwise steps: weight moves from the worst point of the mixture to the best one, up to the
+    optimum of a line search by bisection of the slope.
 
     Parameters
     ----------

@@ -4,7 +4,7 @@ A pdf is either a set of levels (a histogram of a scene with discrete photocurre
 uniform over segments (a histogram of anything else), as in [1]_, section 4.3. Photocurrents have
 any unit; the schedule for shot noise alone depends on their ratios only.
 
-Why sums start at the dark end: a schedule that captures a range of 1e8 asks for differences of the
+Why sums start at the dark end: a schedule that captures a range of 1e8 needs differences of the
 first moment at its dark end, where a sum from the bright end has lost all digits.
 
 References
@@ -62,7 +62,7 @@ class Pdf:
         share = self.probability / self.probability.max()  # a sum of huge counts may overflow
         object.__setattr__(self, "probability", share / share.sum())
         if self.max <= 0:
-            raise ValueError("no photocurrent is above 0: there is nothing to capture")
+            raise ValueError("no photocurrent is above 0")
         for values in (self.low, self.high, self.probability):
             values.setflags(write=False)
 
@@ -259,7 +259,7 @@ def photocurrent_levels(
     """Gather the photocurrents of many pixels in levels of equal ratio.
 
     Why equal ratio: a histogram of equal bins that resolves the bright holds all of the dark in one
-    bin, and captures are as much for the dark. Each bin stands for its brightest pixel, so that a
+    bin, and captures are as much for the dark. Each bin represents its brightest pixel, so that a
     capture that is chosen for a bin saturates no pixel of it.
 
     Parameters

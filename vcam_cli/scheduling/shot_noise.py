@@ -55,13 +55,13 @@ def optimal_schedules(pdf: Pdf, counts: Sequence[int], gap: float = GAP) -> dict
     counts : sequence of int
         Numbers of captures, each at least 1.
     gap : float
-        Certified relative distance from the optimum that is asked for.
+        Requested certified relative distance from the optimum.
 
     Returns
     -------
     dict
         Schedules by number of captures, in the order of `counts`; times are in 1/unit of the
-        photocurrents. Their certified `gap` is 0 for levels, else about half of the one asked for.
+        photocurrents. Their certified `gap` is 0 for levels, else about half of the requested one.
         Of schedules worth the same it is the one with the shortest last time. A capture without
         use (more captures than levels above 0) repeats the last.
 

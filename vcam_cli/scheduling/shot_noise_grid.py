@@ -25,8 +25,8 @@ searches in sorted arrays.
 
 Why the hull is thinned by chords instead of swept with a stack: a sweep is a Python loop over all
 points. A point below a chord between any two others is outside the hull whatever becomes of those
-two, so all points can be tried at once, against chords over 1, 2, 4, ... neighbors. What is left
-are a few concave arcs, and common tangents bridge the dents between them. A sweep finishes a
+two, so all points can be tried at once, against chords over 1, 2, 4, ... neighbors. There remain
+a few concave arcs, and common tangents bridge the dents between them. A sweep finishes a
 hostile case of many dents. Measured for 1 to 20 captures: a uniform pdf takes 0.08 s against 0.28 s
 by sweeps alone, a histogram of 4096 bins 0.14 s against 0.50 s, and 0.22 s without bridges.
 """

@@ -260,7 +260,7 @@ def pixels_by_saturation(pdf: Pdf, times: Floats, sensor: Sensor, order: int = R
     pdf : Pdf
         Photocurrents of the scene [e/s].
     times : (T,) array
-        Rising times, in one of which each pixel shall saturate or not as a whole [s].
+        Rising times; within one of them each pixel saturates as a whole or not [s].
     sensor : Sensor
         The pixel.
     order : int

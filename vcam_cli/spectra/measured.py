@@ -2,7 +2,7 @@
 
 A file is comments and lines of an instrument's own, a header or none, and rows of numbers. The
 first column whose name speaks of wavelengths, or else the first, is the wavelength; the others are
-values, chosen by their names. Rows may rise or fall. What is not told by a name is told by size:
+values, chosen by their names. Rows may rise or fall. Without a name the size decides:
 light has wavelengths of hundreds of nanometers, or around one micrometer.
 """
 
@@ -169,7 +169,7 @@ def _without_numbers(file: Path, lines: list[tuple[int, str]]) -> ValueError:
 
 @dataclass(frozen=True)
 class _Form:
-    """How the cells of a line are told apart."""
+    """How the cells of a line are separated."""
 
     mark: str | None
     """What stands between two cells; None for any number of spaces."""
@@ -191,7 +191,7 @@ _FORMS = (_Form(";"), _Form("\t"), _Form(","), _Form(None))
 
 
 def _form_of_numbers(line: str) -> _Form | None:
-    """Return how the cells of a row of numbers are told apart; None for another line."""
+    """Return how the cells of a row of numbers are separated; None for another line."""
     for form in _FORMS:
         fits = form.mark is None or form.mark in line
         if fits and all(_is_number(cell) for cell in form.split(line)):
@@ -200,7 +200,7 @@ def _form_of_numbers(line: str) -> _Form | None:
 
 
 def _names(line: str, form: _Form) -> tuple[str, ...] | None:
-    """Return the names of a header; None for a line that is none, as it has one cell alone."""
+    """Return the names of a header; None for another line, of a single cell."""
     forms = [form] if form.mark else list(_FORMS[:3])
     for each in forms:
         names = tuple(name.strip().strip('"') for name in each.cells(line))

@@ -56,7 +56,7 @@ LAMPS = {
     "E": "the same power at every wavelength",
     "equal-energy": "the same power at every wavelength",
 }
-"""Illuminant -> what it stands for (CIE 015:2004, tables T.1 and T.7)."""
+"""Illuminant -> the light that it represents (CIE 015:2004, tables T.1 and T.7)."""
 
 
 @cache

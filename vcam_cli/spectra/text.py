@@ -90,7 +90,7 @@ def read_lines(file: Path, most: int) -> Iterator[tuple[int, str]]:
 
 
 def _encoding(file: Path, data: bytes) -> str:
-    """Return the encoding of a text; ValueError for what is none."""
+    """Return the encoding of a text; ValueError for other data."""
     try:
         data.decode("utf-8-sig")
     except UnicodeDecodeError:

@@ -56,7 +56,7 @@ def computed_sweep(
     tell: Callable[[str], None],
     extras: Extras,
 ) -> SweepResult:
-    """Compute what is left of a sweep and write everything; request: see `request_hash`."""
+    """Compute the missing points of a sweep and write everything; request: see `request_hash`."""
     grid = sweep_points.grid(study, sets)
     cameras = StudyCameras(grid, sets)
     planned, expected = figures.plan(cameras), expectations.plan(cameras)
@@ -99,7 +99,7 @@ def computed_sweep(
 
 
 class _Points:
-    """The points of a sweep, and what is known of them."""
+    """The points of a sweep, and their records."""
 
     def __init__(
         self, grid: Grid, folder: SweepFolder, fresh: bool, versions: dict[str, str]
@@ -187,7 +187,7 @@ def _without_texts(camera: Camera) -> Camera:
 def _compute(
     points: _Points, execution: Execution, watch: Observer, tell: Callable[[str], None]
 ) -> int:
-    """Compute what is left of a share, and return the number of points computed."""
+    """Compute the missing points of a share, and return the number of points computed."""
     groups = points.unfinished_points(groups_of_share(points.groups(), execution.share))
     return compute(groups, points, execution, watch, tell)
 

@@ -33,7 +33,7 @@ STEPS, SHOWN = 600, 0.97
 
 @dataclass(frozen=True)
 class MapAxes:
-    """What columns and rows of a map stand for: places on the sensor, or what a chart shows."""
+    """Quantities along columns and rows of a map: places on the sensor, or a chart's variables."""
 
     labels: tuple[str, str]
     x: Array

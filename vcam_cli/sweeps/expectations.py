@@ -1,8 +1,8 @@
 """What a sweep study expected to find, beside what it found: expected.csv.
 
 Everything that an expectation needs is looked up before anything runs: its case, the values of the
-parameter, cameras whose properties it asks for. What is left for the end is to take numbers out of
-the tables and compare them.
+parameter, cameras whose properties it needs. At the end numbers are only read from
+the tables and compared.
 """
 
 from __future__ import annotations
@@ -183,10 +183,10 @@ class _Planner:
         if getattr(item, key) != OPTIMUM:
             return self._metric(key) if is_measured else self._property(key)
         if not is_measured:
-            message = "properties are looked up before the optimum is known"
+            message = "properties cannot be evaluated at the optimum"
             raise self._wrong(key, message, "write a value of the parameter")
         if model.optimize is None or model.optimize.metric != item.quantity:
-            message = f"{item.quantity} is not what the optimum is of"
+            message = f"the study does not optimize {item.quantity}"
             raise self._wrong(key, message, "write a value of the parameter")
         return self._optimum(self._case, "value")
 

@@ -76,7 +76,7 @@ class Figure(Model):
         default=(),
     )
     against: Annotated[str | None, Choice(*PROPERTIES)] = key(
-        "a property that the cases differ in", example="feature_size", default=None
+        "property that differs between the cases", example="feature_size", default=None
     )
     levels: tuple[Positive, ...] = key(
         "levels of Delta E at which lines are drawn", example=[1, 2, 3, 5], default=()

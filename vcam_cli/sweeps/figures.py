@@ -1,6 +1,6 @@
 """The figures of a sweep: for each the table behind it, and the panels that show it.
 
-Curves and optima are made here of what is known of the points and of the figure's cameras; what
+Curves and optima are made here from the records of the points and the figure's cameras; what
 compares pictures is made in `error_maps`. Only a whole sweep has figures: where points are left to
 other shares there are none, and those of a former study go.
 """

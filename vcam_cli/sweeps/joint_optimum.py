@@ -189,8 +189,8 @@ class _Fit:
     def minimum(self, means: Array) -> tuple[Array, Array]:
         """Return where quadratics fitted to means (d, points) are least: (d, k); the values (d,).
 
-        Within the box of what is fitted: on the inside, or on one of its faces, edges or corners,
-        each of which is tried.
+        Within the box of what is fitted: on the inside, or on one of its faces, edges or corners;
+        each is tried.
         """
         count = len(self.middle)
         c = np.linalg.lstsq(self.powers, means.T, rcond=None)[0].T

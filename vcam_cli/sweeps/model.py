@@ -53,17 +53,17 @@ class Variation(Model):
     )
 
     rules = (
-        exactly_one("start", "values", of="what it varies over", remedy="write {values: [...]}"),
+        exactly_one("start", "values", of="varied values", remedy="write {values: [...]}"),
         all_or_none("start", "stop", "count"),
-        needs("spacing", "start", "values that are listed have no spacing"),
+        needs("spacing", "start", "a list of values has no spacing"),
     )
 
 
 class Optimize(Model):
-    """What is sought."""
+    """Objective of the optimization."""
 
     metric: Literal[tuple(METRICS)] = key("one of the metrics", example="mean_s_cielab")  # type: ignore[valid-type]
-    goal: Literal["min", "max"] = key("the least or the most of it", example="min")
+    goal: Literal["min", "max"] = key("minimize or maximize it", example="min")
 
 
 def _cameras(given: Any) -> tuple[str, ...]:
@@ -95,7 +95,7 @@ _Place = Annotated[Any, Either(_place, str | float)]
 
 
 class Expectation(Model):
-    """A quantity of the study and what is expected of it, which changes nothing of the sweep.
+    """An expected range of a quantity of the study; it does not change the sweep.
 
     It is the study's own list of what was published or derived elsewhere; its output says what of
     it came out, and what was set so that it comes out, which proves nothing.
@@ -106,7 +106,7 @@ class Expectation(Model):
         example="optimum",
     )
     between: Annotated[tuple[Any, Any], Either(_two_values, list[str | float])] = key(
-        "the least and the most that is expected", example=["6.35 um", "6.65 um"]
+        "expected range: least and most", example=["6.35 um", "6.65 um"]
     )
     case: Text = key("name of a case; default the first", example="nominal", default="")
     at: _Place = key(
@@ -116,12 +116,13 @@ class Expectation(Model):
         default=None,
     )
     over: _Place = key(
-        "the ratio to what it is there: a value of the parameter, or optimum",
+        "ratio to the quantity at this value of the parameter, or at the optimum",
         example="optimum",
         default=None,
     )
     minus: _Place = key(
-        "the difference from what it is there; of optima from that of another case",
+        "difference from the quantity at this value of the parameter; for optima, from another "
+        "case's",
         unit="",
         example="5.3 um",
         default=None,
@@ -132,17 +133,17 @@ class Expectation(Model):
         default=dict,
     )
     calibrated: Text = key(
-        "what was fitted so that this very number comes out; default nothing: it is predicted",
+        "parameters fitted to this very number; default nothing: it is predicted",
         example="the dark current at the edge",
         default="",
     )
     chosen: Text = key(
-        "what its source leaves open and the study took because this comes out; default nothing",
+        "parameters missing in the source and chosen to reproduce this number; default nothing",
         example="the f-number",
         default="",
     )
-    source: Text = key("who says so", example="Chen 2003, figure 3.8", default="")
-    why: Text = key("why it does not come out, where that is known", example="kTC", default="")
+    source: Text = key("source of the expected value", example="Chen 2003, figure 3.8", default="")
+    why: Text = key("known reason for a deviation", example="kTC", default="")
 
     rules: ClassVar[tuple[Rule, ...]] = (
         at_most_one("over", "minus"),
@@ -207,7 +208,7 @@ class Sweep(Model):
         "number of frame seeds, from the camera's up, likewise averaged", example=4, default=1
     )
     metrics: Annotated[tuple[str, ...], words_of(tuple(METRICS), 1)] = key(
-        "what is measured", example=["snr_db"]
+        "measured metrics", example=["snr_db"]
     )
     optimize: Annotated[Optimize | None, mapping(Optimize)] = key(
         "find the best value of each parameter",
@@ -218,12 +219,12 @@ class Sweep(Model):
         "frames kept of every point: raw, render", example=[], default=()
     )
     figures: dict[Word, Figure] = key(
-        "name of a PNG and a CSV -> what they show",
+        "name of a PNG and a CSV -> figure",
         example={"best": {"show": "curves", "quantities": ["snr_db"]}},
         default=dict,
     )
     expect: dict[Word, Expectation] = key(
-        "name -> a quantity, and between which values it is expected: expected.csv",
+        "name -> a quantity and its expected range: expected.csv",
         example={"best": {"quantity": "optimum", "between": ["6 um", "7 um"]}},
         default=dict,
     )

@@ -286,7 +286,7 @@ def bootstrap_means(curves: Array, rest: float, least: int = MIN_BOOTSTRAP_CURVE
     """Return means of curves drawn with replacement: (DRAWS, points).
 
     The spread of n curves around their own mean is too small by (n - 1) / n, which is undone. Few
-    curves make too few means: normal errors of the same variance stand for them. rest: rms of what
+    curves make too few means: normal errors of the same variance replace them. rest: rms of what
     the fit leaves beside the spread, all there is of a single curve; least: number of curves that
     are not few. None where nothing is known.
     """

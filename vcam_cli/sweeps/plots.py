@@ -42,7 +42,7 @@ class Curve:
     high: Array | None = None
     """From where to where each value may be."""
     optimum: CaseOptimum | None = None
-    """A cross, with its interval; a triangle at the end of the range where there is none."""
+    """A cross, with its interval; or a triangle for an optimum at the end of the range."""
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ def _draw_curve(axes: Any, curve: Curve) -> None:
 
 
 def _draw_optimum(axes: Any, best: CaseOptimum, color: str) -> None:
-    """Draw the cross and the interval of an optimum; where there is none, which end is best."""
+    """Draw the cross and the interval of an optimum; without one, mark the best end."""
     if best.edge:
         marker, side = ("<", "left") if best.edge == "low" else (">", "right")
         axes.plot(best.end, best.value, marker, ms=8, mfc="none", mec="black", mew=1.2, zorder=5)

@@ -35,4 +35,4 @@ def effect_differences(points: Iterable[Point]) -> str:
     if not some:
         return ""
     listed = ", ".join(f"{name} in {counts[name]} of {len(cameras)}" for name in some)
-    return f"cameras of this sweep simulate different effects, as their files say: {listed}"
+    return f"the camera files of this sweep set different effects: {listed}"

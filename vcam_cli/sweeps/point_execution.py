@@ -1,7 +1,7 @@
 """Who computes the points of a sweep, or the frames of a data set, and how they are kept.
 
-A share is told by its number; workers are processes of this machine, or those of a cluster. What
-is finished is kept at once, so that whatever was stopped goes on.
+A share is identified by its number; workers are processes of this machine or of a cluster.
+Finished points are kept at once, so that an interrupted study continues.
 """
 
 from __future__ import annotations

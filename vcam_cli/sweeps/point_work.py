@@ -103,7 +103,7 @@ _SHARED = Shared()
 
 
 def compute_on_cluster(jobs: Sequence[Task], tasks: int) -> list[Outcome]:
-    """Compute points in a process of a cluster that runs so many tasks at once."""
+    """Compute points in a process of a cluster that runs `tasks` tasks at once."""
     return compute_points(jobs, max(1, available_workers() // max(1, tasks)), _SHARED)
 
 

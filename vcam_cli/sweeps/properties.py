@@ -143,7 +143,7 @@ def _mtf(camera: Camera, nyquist: float) -> list[Curves]:
     There is that of the system, eq 2.28 of [1], and that of silicon and aperture, section 3.2.2.
     """
     if camera.scene.illuminant is None:
-        message = "the light of this scene is known only by its file"
+        message = "the light level of this scene is only in its file"
         raise bad("scene.source", message, "set a chart and an illuminant for this figure")
     solved, frequency = solve(camera), np.linspace(0, nyquist * 1e3, FREQUENCIES)
     mosaic, white = solved.layout.mosaic, (light.white_radiance(camera.scene),)
@@ -191,7 +191,9 @@ def _diagonal_curves(camera: Camera) -> Curves:
     tunnel = next(iter(of_kind(gains, PixelVignetting)), None)
     falloff = next((e for e in gains if e.name == OffAxis.name), None)
     if tunnel is None and falloff is None:
-        message = "neither a stack above the pixels nor a falloff is there: all collect alike"
+        message = (
+            "needs a stack above the pixels or a lens falloff: here all pixels collect equally"
+        )
         raise bad("pixel.stack", message, "name a case that has one, or set pixel.stack")
     part, ones = np.linspace(-1, 1, POSITIONS), np.ones(POSITIONS)
     x, y = part * g.sensor_width / 2, part * g.sensor_height / 2

@@ -11,7 +11,7 @@ from vcam_cli.camera.quality import METRICS_OF, UNITS
 
 METRICS = {name: unit for name, unit in UNITS.items() if not name.startswith("hdr_")}
 """Metric that a study can measure -> its unit."""
-QUALITY = {metric: asked for asked, metric in METRICS_OF.items()}
+QUALITY = {metric: entry for entry, metric in METRICS_OF.items()}
 """Metric -> the entry of a camera's `quality` that it needs; every run has the other metrics."""
 PROPERTIES = {
     "fill_factor": "",

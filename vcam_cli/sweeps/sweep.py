@@ -1,7 +1,7 @@
 """A sweep from its study to its tables: what `vcam sweep` does.
 
-What is finished is kept at once, a file a point; tables and plots are made of what is kept and
-what is known, in the study's order. So they are the same bytes however often the sweep was
+Finished points are kept at once, a file a point; tables and plots are made of these and of
+the study, in its order. So they are the same bytes however often the sweep was
 stopped, and whoever computed its points.
 """
 
@@ -63,7 +63,7 @@ def sweep(
     formats: Sequence[str] = (),
     expect: Sequence[str] = (),
 ) -> SweepResult:
-    """Run a sweep study, or what is left of it, and write its tables and plots.
+    """Run a sweep study, or its missing points, and write its tables and plots.
 
     study: a file, or the name of a shipped study; out: folder, default out/NAME; sets: overrides
     "PATH=VALUE" of the study, and of every camera where PATH begins with no key of a study;

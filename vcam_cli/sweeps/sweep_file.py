@@ -41,7 +41,7 @@ NOMINAL = "nominal"
 """The case of a study that names none."""
 OTHERS = {
     "sweep": ("schedule", "this is a study of capture schedules"),
-    "schedule": ("sweep", "this is a study of a camera whose parameters change"),
+    "schedule": ("sweep", "this is a sweep study"),
 }
 """Kind of study -> the other kind, and what such a one is."""
 
@@ -210,7 +210,7 @@ def read(study: str | Path, folder: Path | None = None, sets: Sequence[str] = ()
 
 
 def _camera_files(study: StudyFile) -> Iterator[Document[Camera]]:
-    """Yield the study's camera files. Raises BadInput for one that is none, or two of one name."""
+    """Yield the study's camera files. Raises BadInput for another file, or two of one name."""
     node = study.node("camera")
     names: set[str] = set()
     for item in node.value if isinstance(node.value, list) else [node]:

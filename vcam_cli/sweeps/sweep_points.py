@@ -217,7 +217,7 @@ def case_file(case: StudyCase, nodes: Mapping[str, Node], over: Node) -> Documen
 
 
 def with_next_seed(camera: Camera, number: int) -> Camera:
-    """Return a camera with the frame seed so many after its own."""
+    """Return a camera with its frame seed raised by `number`."""
     seed = Seed(sensor=camera.seed.sensor, frame=camera.seed.frame + number)
     return camera.model_copy(update={"seed": seed})
 

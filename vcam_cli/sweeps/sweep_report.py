@@ -12,8 +12,8 @@ from vcam_cli.sweeps.sweep_result import SweepResult
 CAPTIONS = {
     "points.csv": "Every point with its metrics, and with its error where it failed.",
     "timings.csv": "The seconds that each point took.",
-    "optimum.csv": "The best values. From low to high: what repeats and seeds cannot tell apart.",
-    "expected.csv": "What was expected, on what ground, and what was found.",
+    "optimum.csv": "The best values, with intervals over repeats and seeds (low to high).",
+    "expected.csv": "Expectations, their sources, and the results.",
 }
 
 

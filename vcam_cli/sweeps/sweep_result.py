@@ -68,7 +68,7 @@ class Outcome:
 
 
 def read_outcome(point: str, content: dict[str, Any]) -> Outcome:
-    """Return the outcome of what was kept of a point. Raises ValueError where it is none."""
+    """Return the outcome of a point's record. Raises ValueError for an invalid record."""
     try:
         return Outcome(
             point,
@@ -94,7 +94,7 @@ def error_cell(problems: Sequence[Problem]) -> str:
 class CaseOptimum:
     """The optimum of a parameter in a case, its numbers rounded, nan where unknown.
 
-    There is none where an end of the range is as good as any place in it.
+    It is None where an end of the range is as good as any place in it.
     """
 
     case: str
@@ -120,7 +120,7 @@ class CaseOptimum:
 
     @property
     def row(self) -> tuple[Cell, ...]:
-        """The row of optimum.csv; what is not known is empty."""
+        """The row of optimum.csv; unknown values are empty."""
         cells = {name: getattr(self, name) for name in OPTIMUM_COLUMNS}
         if self.edge:
             cells["optimum"] = "none"
@@ -128,14 +128,14 @@ class CaseOptimum:
 
     @property
     def mark(self) -> str:
-        """Its interval as tables of figures have it, or that there is none."""
+        """Its interval as tables of figures have it, or a note that it has none."""
         if self.edge:
             return f"no optimum: best at the {self.edge} end"
         return "optimum" if _is_unknown(self.low) else f"optimum {self.low:.6g} to {self.high:.6g}"
 
     @property
     def plain(self) -> dict[str, Any]:
-        """The same as JSON, what is not known as null."""
+        """The same as JSON; unknown values are null."""
         return {k: None if _is_unknown(value) else value for k, value in asdict(self).items()}
 
 
@@ -169,7 +169,7 @@ class SweepResult:
     points: list[Row]
     """The rows of points.csv, with the names of its columns."""
     missing: int
-    """Number of points of which nothing is known yet: those of other shares."""
+    """Number of points not computed yet: those of other shares."""
     refused: tuple[str, ...]
     """What is wrong with cameras of the study."""
     all_refused: bool
@@ -264,7 +264,7 @@ class SweepResult:
 def request_hash(study: StudyFile, sets: Sequence[str], extras: Extras) -> str:
     """Return the hash of what is asked, but for the contents of the files that it names.
 
-    sets: overrides "PATH=VALUE" laid over every camera. Raises BadInput for what is none.
+    sets: overrides "PATH=VALUE" laid over every camera. Raises BadInput for another text.
     """
     folder = current_folder()
     over = cameras.overlay(sets, folder)

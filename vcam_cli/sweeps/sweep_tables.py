@@ -56,7 +56,7 @@ class Surface:
 
 @dataclass(frozen=True)
 class Findings:
-    """What is known of the points of a study."""
+    """Records of the points of a study."""
 
     grid: Grid
     outcomes: Mapping[str, Outcome]
@@ -79,7 +79,7 @@ class Findings:
         return tuple(o for case in self.grid.cases for o in self._case_optima(case, wanted))
 
     def optimum(self, case: str, parameter: str) -> CaseOptimum | None:
-        """Return the optimum of a parameter in a case; None where there is none."""
+        """Return the optimum of a parameter in a case; None without one."""
         found = (o for o in self.optima if (o.case, o.parameter) == (case, parameter))
         return next(found, None)
 
@@ -107,7 +107,7 @@ class Findings:
 def _joint_optima(
     case: str, surface: Surface, best: Sequence[int], wanted: Optimize
 ) -> dict[int, CaseOptimum]:
-    """Return the joint optimum by axis, of two parameters or more; {} where there is none."""
+    """Return the joint optimum by axis, of two parameters or more; {} without one."""
     axes = [
         i
         for i, parameter in enumerate(surface.parameters)
@@ -152,7 +152,7 @@ def _table_row(case: str, parameter: Parameter, found: Optimum, wanted: Optimize
 def result(
     findings: Findings, out: Path, expectations: tuple[ExpectationResult, ...], computed: int
 ) -> SweepResult:
-    """Return the result of a sweep, of which so many points were computed now."""
+    """Return the result of a sweep; computed: number of points computed now."""
     grid, outcomes = findings.grid, findings.outcomes
     names = _point_columns(grid)
     refused = [not p.id or (p.id in outcomes and _is_refused(outcomes[p.id])) for p in grid.points]
@@ -206,7 +206,7 @@ def _point_columns(grid: Grid) -> tuple[str, ...]:
 
 
 def _point_rows(findings: Findings) -> Iterator[Row]:
-    """Yield the rows of all points of which something is known."""
+    """Yield the rows of all points that have a record."""
     metrics = findings.grid.study.model.metrics
     for point in findings.grid.points:
         error, values = error_cell(point.problems), {}

@@ -126,7 +126,7 @@ def compute_here(groups: Groups, ask: Ask, threads: int) -> Iterator[Outcome]:
 
 
 def compute_in_processes(groups: Groups, ask: Ask, count: int, threads: int) -> Iterator[Outcome]:
-    """Compute points in processes of this machine, each with so many threads."""
+    """Compute points in processes of this machine, each with `threads` threads."""
     processes = [WorkerProcess(threads) for _ in range(count)]
     queue = JobQueue(groups, ask)
     with ThreadPool(count) as pool:
@@ -248,7 +248,7 @@ class WorkerProcess:
                 self._process.wait()
 
     def _start(self) -> None:
-        """Start the process where there is none."""
+        """Start the process unless it runs."""
         with self._lock:
             if self._ended:
                 raise CancelledError
@@ -307,7 +307,7 @@ def _outcomes(batch: Batch, future: Any, lost: str) -> list[Outcome] | None:
 
 @contextmanager
 def _silence(*names: str) -> Iterator[None]:
-    """Silence these loggers and those below them, each of which may have a level of its own."""
+    """Silence these loggers and those below them, which may have levels of their own."""
     below = tuple(f"{name}." for name in names)
     found = [name for name in logging.root.manager.loggerDict if name.startswith(below)]
     loggers = [logging.getLogger(name) for name in (*names, *found)]
@@ -331,7 +331,7 @@ def _distributed() -> Any:
 
 
 def _client(distributed: Any, address: str) -> Any:
-    """Return a client of the scheduler. Raise CannotDo where there is none."""
+    """Return a client of the scheduler. Raise CannotDo without a scheduler."""
     arguments = distributed.Security().get_connection_args("client")
     if address.startswith("tls") and not arguments.get("ssl_context"):
         message = f"Dask's configuration has no certificates for {address}"
@@ -349,8 +349,8 @@ def _client(distributed: Any, address: str) -> Any:
         message = f"no Dask scheduler answers at {address} within {CONNECT_TIMEOUT:g} s"
         raise CannotDo(message, "start one with: dask scheduler") from error
     except Exception as error:  # whatever Dask makes of bytes that another program sends
-        message = f"what listens at {address} is no Dask scheduler"
-        raise CannotDo(message, "look for the port in what dask scheduler prints") from error
+        message = f"the program at {address} is no Dask scheduler"
+        raise CannotDo(message, "use the address that `dask scheduler` prints") from error
 
 
 def _slots(client: Any, address: str, report: Callable[[str], None]) -> list[tuple[str, int]]:
@@ -367,7 +367,7 @@ def _slots(client: Any, address: str, report: Callable[[str], None]) -> list[tup
 
 
 def processes_and_threads(workers: int | None, points: int) -> tuple[int, int]:
-    """Return the number of processes for so many points, and of the threads in each.
+    """Return the number of processes for `points` points, and of the threads in each.
 
     Together they have no more threads than there are processors, unless more workers are wanted.
     """

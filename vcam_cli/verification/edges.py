@@ -69,7 +69,7 @@ def edge_responses(frames: Array, measurement: Measurement) -> dict[str, list[Ed
 
 
 def judge_edge(camera: Camera, stack: Stack, measurement: Measurement, number: int) -> list[Judged]:
-    """Return the sharpness of an edge beside that which a camera file with a lens predicts.
+    """Return the sharpness of an edge beside the prediction of a camera file with a lens.
 
     Parameters
     ----------

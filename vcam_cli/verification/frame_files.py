@@ -44,7 +44,7 @@ class Page:
 
     @property
     def name(self) -> str:
-        """What the user is told of it."""
+        """Notes on it, for the user."""
         more = f", page {self.number + 1}" if self.count > 1 else ""
         return f"{self.path.name}{more}"
 

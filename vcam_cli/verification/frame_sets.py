@@ -17,18 +17,18 @@ PATTERNS = Literal["monochrome", "bayer-rggb", "bayer-grbg", "bayer-gbrg", "baye
 
 
 def _is_dark_or_lit(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
-    """Refuse an amount of light where there is none."""
+    """Refuse an amount of light for dark frames."""
     named = [name for name in ("irradiance", "photons") if given.get(name) is not None]
     if named and given.get("light", "none") in ("none", None) and not given.get("target"):
         message, remedy = (
-            "light is none, and there is an amount of it",
+            "`light: none` excludes an amount of light",
             "give light, or leave it out",
         )
         yield fault((named[0],), message, remedy, given[named[0]])
 
 
 class FrameSet(Model):
-    """Raw frames that were taken under the same conditions."""
+    """Raw frames taken under the same conditions."""
 
     files: Text = key(
         "the frames, *.tif for several: whole numbers in TIFF (all pages), PNG, PGM, npy, EXR as"
@@ -38,7 +38,7 @@ class FrameSet(Model):
     name: Text = key("name in tables; default its number", example="dark, shortest", default="")
     exposure: Annotated[float, TIME] = key("exposure time", example="10 ms")
     light: Annotated[IlluminantSpec | None, Light()] = key(
-        "the light on the sensor, as scene.illuminant has it; none for dark frames",
+        "light on the sensor, in the form of scene.illuminant; none for dark frames",
         example={"monochromatic": "532 nm"},
         default=None,
     )
@@ -50,7 +50,7 @@ class FrameSet(Model):
         example=4500,
         default=None,
     )
-    target: Literal["flat", "slanted-edge"] = key("what was taken", default="flat")
+    target: Literal["flat", "slanted-edge"] = key("target of the frames", default="flat")
     temperature: MaybeSiliconTemperature = key(
         "of the sensor; default that of the flat frames", example="310 K", default=None
     )
@@ -73,7 +73,7 @@ class Levels(Model):
 
 
 class MeasuredPixel(Model):
-    """What is known of the pixels."""
+    """Pixels of the measured sensor."""
 
     width: PixelSize = key("pitch of the pixels", example="3.45 um")
     height: PixelSize = key("default the width", example="3.45 um", default=None)

@@ -50,7 +50,7 @@ class Stack:
 
     @property
     def notes(self) -> list[str]:
-        """What the user is told of frames that are left out."""
+        """Notes on frames left out, for the user."""
         told = [f"{self.label}: {name} is unlike the others and left out" for name in self.dropped]
         if self.shift:
             told.append(
@@ -81,7 +81,7 @@ def paths(
     """Return the frames of every entry that are to be fitted: number of the entry -> pages.
 
     held_out: those that are to be predicted instead: all where none are held out; of edges alone
-    where `edges` says so, else of all others.
+    where `edges` is true, else of all others.
 
     Raises BadInput where a file is no file of frames, or an entry has too few of them: one to
     predict, two to fit.

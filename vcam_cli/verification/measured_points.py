@@ -45,7 +45,7 @@ class Taken:
 def measured_points(
     camera: Camera, measurement: Measurement
 ) -> tuple[Points, list[Taken], list[str]]:
-    """Return all mean signals, in the order of the entries, frames, and what the user is told.
+    """Return all mean signals, in the order of the entries, frames, and notes for the user.
 
     Of frames there is one signal a color, over the frames that are held out from fitting, or all
     of them where none are. Frames of edges have none.
@@ -81,8 +81,8 @@ def measured_points(
         if whole != inner.shape[1:] and len(taken) == 1:
             notes.append(f"noise is judged in the middle {WINDOW} x {WINDOW} pixels")
         if len(stack.frames) < 2:
-            notes.append(f"{stack.label}: one frame is left to be predicted, and its temporal noise"
-                         " is not judged; hold out more")  # fmt: skip
+            one = f"{stack.label}: one held-out frame does not determine temporal noise"
+            notes.append(f"{one}, which is skipped; hold out more")
     return sorted(points, key=lambda each: each[0]), taken, notes
 
 
@@ -132,7 +132,7 @@ def _check(camera: Camera, measurement: Measurement) -> None:
             continue
         if entry.irradiance is None and entry.photons is None:
             remedy = "add irradiance: 0.12 W/m2, or photons: 4500"
-            problems.add(("frames", number), "how much light there is, is missing", remedy)
+            problems.add(("frames", number), "the amount of light is missing", remedy)
     raise_if_any(problems, measurement)
 
 

@@ -57,15 +57,15 @@ class SignalType(YamlType):
 
 
 def _is_lit(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
-    """Require a level where there is light, and none where there is none."""
+    """Require a level with light, and none without."""
     levels = [name for name in ("irradiance", "photons") if name in given]
     dark = given.get("light", "none") == "none"
     if dark and levels:
-        message = "there is no light to be measured"
+        message = "dark frames have no light level"
         yield fault((levels[0],), message, "add light: {monochromatic: 532 nm}", given[levels[0]])
     if not dark and not levels:
         remedy = "add irradiance: 0.12 W/m2, or photons: 4500"
-        yield fault((), "how much light there is, is missing", remedy)
+        yield fault((), "the amount of light is missing", remedy)
 
 
 class Point(Model):
@@ -84,7 +84,7 @@ class Point(Model):
     )
     exposure: Annotated[float, TIME] = key("exposure time", example="30 ms")
     light: Annotated[IlluminantSpec | None, Light()] = key(
-        "the light on the sensor: a lamp as scene.illuminant has it, filters and all; or none",
+        "light on the sensor: a lamp in the form of scene.illuminant, with filters; or none",
         example={"monochromatic": "532 nm"},
         default=None,
     )
@@ -130,7 +130,7 @@ def _entry(given: Any) -> Point | FrameSet:
 
 
 class Measurement(FileModel):
-    """What was measured of one sensor."""
+    """Measurements of one sensor."""
 
     kind: Literal["measurement"] = key("the kind of file", example="measurement")
     name: Word = key(
@@ -142,7 +142,7 @@ class Measurement(FileModel):
         tuple[Point | FrameSet, ...],
         Either(_entries, list[Point | FrameSet], yaml_form=to_yaml),
     ] = key(
-        "what was measured, one entry a condition: a mean signal, or files of raw frames",
+        "measurements, one entry per condition: a mean signal, or files of raw frames",
         example=[{"signal": "0.42 V", "exposure": "30 ms"}],
     )
     levels: Annotated[Levels | None, mapping(Levels)] = key(
@@ -158,10 +158,12 @@ class Measurement(FileModel):
     )
     pattern: PATTERNS = key("color filter array of the frames", default="monochrome")
     hold_out: Annotated[float, Percentage(least=0, below=1)] = key(
-        "frames of every entry that are not fitted, the last ones", example="20 %", default=0.0
+        "number of frames of every entry held out from the fit, the last ones",
+        example="20 %",
+        default=0.0,
     )
     tolerance: Annotated[float | None, Percentage(above=0, most=1)] = key(
-        "largest error of a prediction; default none is asked for", example="8 %", default=None
+        "largest allowed error of a prediction; default: no limit", example="8 %", default=None
     )
     noise_tolerance: Annotated[float | None, Percentage(above=0, most=10)] = key(
         "largest error of a prediction of variances, spectra and tails of frames; default none",

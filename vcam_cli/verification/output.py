@@ -34,8 +34,8 @@ def report_arguments(found: Verification) -> dict[str, Any]:
     cards = [Facts("Errors", [(name.replace("_", " "), f"{value:.4g}") for name, value in numbers])]
     cards += note_facts(found.notes)
     captions = {
-        "verify.csv": "What was measured beside what the camera file predicts.",
-        "errors.png": "How many predictions have which error",
+        "verify.csv": "Measured values beside predictions of the camera file.",
+        "errors.png": "Histogram of prediction errors",
     }
     about = "Mean signals under even light of known irradiance, predicted from a camera file."
     title = f"{found.measurement.name} against {found.camera.name}"

@@ -50,7 +50,7 @@ def _draw_deviations(axes: Any, result: Verification) -> None:
     axes.hist(values, np.linspace(-ends, ends, 41), color=COLORS[0], edgecolor="white")
     for side in (-limit, limit):
         axes.axvline(side, color=COLORS[1], linewidth=1, linestyle="--")
-    axes.set_xlabel("deviation [standard errors]; those beyond the ends stand there")
+    axes.set_xlabel("deviation [standard errors]; values beyond the axis are in the end bins")
     axes.set_ylabel("number of quantities")
     axes.yaxis.get_major_locator().set_params(integer=True)
     differing = sum(row.differs for row in rows)

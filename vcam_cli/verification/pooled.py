@@ -2,8 +2,8 @@
 
 A conversion gain that is 5 % off changes every temporal variance by 5 %, which may be within the
 chance of each. Their sum is not: deviations of n frames that are off alike add up to n, and by
-chance to about n^1/2. What is chance is told by the predicted stacks: each has its own sum, of
-its deviations from the others, with what frames of one sensor have in common.
+chance to about n^1/2. The predicted stacks give its distribution: each has its own sum, of
+its deviations from the others, including errors shared by frames of one sensor.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ def check(camera: Camera, point: Point) -> None:
         what = f"{point.channel!r} is no color of this camera" if point.channel else "is missing"
         raise bad(("channel",), what, f"write channel: {' or '.join(dict.fromkeys(colors))}")
     if point.signal.channel == "volts" and not electrical(camera).has_volts:
-        message = "is in volts, and this camera counts in electrons and DN alone"
+        message = "is in volts, but this camera is defined in electrons and DN only"
         remedy = "give it in DN, or add pixel.readout.conversion_gain to the camera"
         raise bad(("signal",), message, remedy)
 

@@ -4,7 +4,7 @@ The camera takes the stack again and again, each time as another sensor with oth
 file is right, the measured stack is one more of these, so that the difference of a quantity from
 their mean, over their standard deviation and (1 + 1/R)^1/2 of R stacks, is a number of Student's
 distribution of R - 1 degrees of freedom: a test that is exact for normal quantities, whatever
-their errors are. It is asked for with 1 % for all quantities together (Bonferroni), so that of a
+their errors are. It is applied at 1 % for all quantities together (Bonferroni), so that of a
 hundred right camera files one is said to differ.
 
 References
@@ -152,7 +152,7 @@ def _normal_of(forms: Array, least: float) -> tuple[float, float]:
 
 
 def bound(count: int, share: float = 1.0) -> float:
-    """Return the deviation beyond which one of so many quantities differs.
+    """Return the deviation beyond which one of `count` quantities differs.
 
     share: of `FALSE_ALARMS` that all of them may have.
     """

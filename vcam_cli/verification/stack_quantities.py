@@ -111,7 +111,7 @@ def _temporal(frames: Array, good: Array) -> Iterator[Quantity]:
 
 
 def _spatial(average: Array, good: Array, frames: int) -> Iterator[Quantity]:
-    """Yield variance and spectra of the mean of so many frames: pattern, and noise left in it.
+    """Yield variance and spectra of the mean of `frames` frames: pattern, and residual noise.
 
     That of pixels is without slow differences, which are those of blocks.
     """

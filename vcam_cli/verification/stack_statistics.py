@@ -2,7 +2,7 @@
 
 A frame's residual is what it differs from the mean of its stack, its own mean taken out, since
 that is light that drifts. Means over its rows and columns hold the noise of these and a share of
-the pixels'; what is left of them is the pixels' own. All divisors are degrees of freedom, so that
+the pixels'; the residual is the pixels' own. All divisors are degrees of freedom, so that
 the variances do not depend on how many frames and pixels there are.
 """
 

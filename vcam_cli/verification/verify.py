@@ -42,7 +42,7 @@ class Row:
     measured: float
     predicted: float
     tolerance: float | None
-    """Largest error that is asked for, relative; None for none."""
+    """Largest allowed error, relative; None: no limit."""
     deviation: float | None = None
     """Student's t of what was measured among what is predicted; None of a mean without noise."""
     bound: float | None = None
@@ -112,7 +112,7 @@ class Verification:
     def summary(self) -> dict[str, float | int]:
         """Return numbers of the errors of means [%], and counts of rows.
 
-        These are all, those that miss a tolerance, those of which it is known what is chance, and
+        These are all, those that miss a tolerance, those with a known distribution of chance, and
         those that differ by more than that.
         """
         percent = 100 * self.errors if self.errors.size else np.full(1, math.nan)
@@ -292,4 +292,4 @@ def _rows(
 
 def _notes(camera: Camera, points: Points) -> Iterator[str]:
     if camera.optics.is_lens and points:
-        yield "the camera's lens is left out: what was measured of light is that on the sensor"
+        yield "the camera's lens is skipped: the measured light is that on the sensor"

@@ -151,11 +151,11 @@ def _kind(file: str, column: str) -> tuple[str, float, bool] | None:
         return axis, ANGLES[unit], False
     allowed = TIMES if axis == "time" else RATES if gyro else {**ANGLES, **RATES}
     listed = ", ".join(unit for unit in allowed if "_" not in unit)
-    raise ValueError(f"{file}: {column!r} does not say its unit; write one of {listed} behind it")
+    raise ValueError(f"{file}: {column!r} has no unit; write one of {listed} behind it")
 
 
 def _name_and_unit(column: str) -> tuple[str, str]:
-    """Return the name of a column in small letters, and its unit; "" where there is none."""
+    """Return the name of a column in small letters, and its unit; "" without a unit."""
     text = column.strip().lower().replace("°", "deg").replace("µ", "u")
     if bracketed := re.fullmatch(r"(.*?)\s*[\[(](.*)[\])]", text):
         return bracketed[1].replace(" ", "_"), bracketed[2].replace(" ", "")

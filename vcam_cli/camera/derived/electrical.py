@@ -252,7 +252,7 @@ def _check_black_levels(camera: CameraModel, found: Circuit) -> None:
 
 
 def no_volts(path: str, what: str, instead: str) -> BadInput:
-    """Return the error about `what` that the file asks for at `path` without giving a voltage."""
+    """Return the error about `what` that the file requires at `path` without giving a voltage."""
     return bad(
         path,
         f"{what} needs a voltage, and the file counts in electrons and DN alone",
@@ -300,6 +300,6 @@ def _solve(
         "pixel.readout",
         "the readout is not determined",
         "give two of conversion_gain, voltage_swing and full_well"
-        " (photodetector.capacitance may stand for conversion_gain),"
+        " (photodetector.capacitance may replace conversion_gain),"
         " or full_well alone, as data sheets do",
     )

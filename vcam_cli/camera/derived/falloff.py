@@ -31,7 +31,7 @@ class Falloff:
 
 
 def falloff(camera: CameraModel, geometry: Geometry) -> Falloff | None:
-    """Return the table that `optics.off_axis` names, or a traced lens's; None where there is none.
+    """Return the table that `optics.off_axis` names, or a traced lens's; None without either.
 
     Raises BadInput for a file that cannot be read, is no such table, or ends before the corner of
     the array.

@@ -57,7 +57,7 @@ def frame_rate(camera: CameraModel) -> FrameRate | None:
     if ARCHITECTURES[name].transfers:
         transfer = camera.pixel.readout.charge_transfer
         assert transfer is not None
-        # One phase stands for a whole stage: how long its gates are is not told.
+        # One phase represents a whole stage: the file does not give the length of its gates.
         if given is None and (transfer.phases == 1 or transfer.inefficiency == 0):
             return None
         return _of_registers(camera, given or Timing(), transfer)
@@ -101,7 +101,7 @@ def _of_registers(camera: CameraModel, given: Timing, transfer: ChargeTransfer) 
     )
     pixel_time = across if given.pixel_time is None else given.pixel_time
     if pixel_time <= 0:
-        message = "is missing: charge transfer without loss says nothing of the time it takes"
+        message = "is missing: lossless charge transfer does not determine its time"
         raise bad(f"{PATH}.pixel_time", message, "add pixel_time: 25 ns")
     row = down + columns * pixel_time / given.outputs
     told = "as clocked"

@@ -223,6 +223,6 @@ def check_motion(camera: Camera) -> None:
         path = SCENE if motion else CAMERA
         raise bad(path, "a bare sensor forms no image that could move", "remove it")
     if motion and (motion.x or motion.y) and math.isinf(camera.scene.distance):
-        message = "what is infinitely far does not move by meters a second"
+        message = "an object at infinity has no speed in meters per second"
         raise bad(SCENE, message, "give scene.distance, or scene.camera_motion: {pan: 10 deg/s}")
     exposed_motion(camera, solve(camera))

@@ -61,7 +61,7 @@ class Places:
 def lattice(camera: CameraModel) -> Lattice:
     """Return the lattice of a camera's pixels; pixels at places of their own are one row.
 
-    Raises BadInput for a die smaller than a pixel, a file of positions that is none, and one of an
+    Raises BadInput for a die smaller than a pixel, an invalid file of positions, and one of an
     array beside the picture.
     """
     array, pixel = camera.array, camera.pixel
@@ -103,7 +103,7 @@ def _require_axis_inside(found: Places, pitch_x: float, pitch_y: float) -> None:
         middle = [(float(at.min()) + float(at.max())) / 2e-6 for at in (found.x, found.y)]
         raise bad(
             PATH,
-            "the array lies beside the middle of the picture, from which x_um and y_um count",
+            "the optical axis, the origin of x_um and y_um, lies outside the array",
             f"write origin: corner beside positions, or subtract {middle[0]:.6g} from x_um and"
             f" {middle[1]:.6g} from y_um",
         )

@@ -33,7 +33,7 @@ class Lens:
     """Diameter of the exit pupil over that of the entrance pupil."""
 
     def scale_at(self, distance: float) -> float:
-        """Return the size of an image over that of what is seen, by the lens's central ray.
+        """Return the size of an image over that of its object, by the lens's central ray.
 
         It is 0 at infinity, and the magnification's size for what is in focus.
         """

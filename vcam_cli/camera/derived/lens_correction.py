@@ -83,7 +83,7 @@ class LensCorrection:
 
 
 def lens_correction(camera: Camera, geometry: Geometry) -> LensCorrection | None:
-    """Return the correction that a camera's processing makes; None where there is none to make.
+    """Return the correction that a camera's processing makes; None without one.
 
     Parameters
     ----------

@@ -69,7 +69,7 @@ def check_shutter(camera: Camera) -> None:
         return
     path, binning = ("exposure", "shutter"), camera.array.binning
     if isinstance(camera.array.pattern, Positions):
-        message = "pixels at places of their own have no lines that are exposed in turn"
+        message = "pixels at free positions have no lines for a rolling shutter"
         raise bad(path, message, "write shutter: global")
     if binning is not None and binning.kind != "digital":
         message = f"a rolling shutter with {binning.kind} binning is not built yet"

@@ -87,7 +87,7 @@ def _unusual_dark_current(camera: CameraModel) -> tuple[str, ...]:
     return (
         f"the equation of the junction gives {1e5 * density:.4g} nA/cm2 of dark current, and"
         f" photodetectors of the kind {own.kind} have mostly less than {1e5 * usual:.2g} nA/cm2 at"
-        f" {ROOM_TEMPERATURE:.0f} K: lifetimes in the junction may be those of another process;"
+        f" {ROOM_TEMPERATURE:.0f} K: the junction's lifetimes may belong to another process;"
         " give dark_current_density as a number to use what was measured",
     )
 
@@ -124,7 +124,7 @@ def quantum_efficiency(camera: CameraModel) -> Spectrum:
 
 
 def diffusion(camera: CameraModel) -> Diffusion | None:
-    """Return the lengths that decide the diffusion of charge, where the file asks for it.
+    """Return the lengths that decide the diffusion of charge, where the file requests it.
 
     Raises BadInput for numbers of the process that are missing.
     """

@@ -162,7 +162,7 @@ def _kept(
 
 @lru_cache(maxsize=64)
 def sensor_view(lens: TracedLens, distance: float, defocus: float) -> View:
-    """Return the lens before an object at a distance; kept, since it is asked for often."""
+    """Return the lens before an object at a distance; kept, since it is used often."""
     return lens.view(distance, defocus)
 
 
@@ -241,7 +241,7 @@ def distortion(view: View, corner: float) -> FieldTable:
 def lateral_color(view: View, corner: float, shortest: float, longest: float) -> WavelengthTable:
     """Return the magnification by wavelength, over that of the primary one, less 1.
 
-    The best one over the disk up to the corner [m]: what is left changes with the field, and moves
+    The best one over the disk up to the corner [m]: the residual changes with the field, and moves
     the blurs.
     """
     heights = corner * np.sqrt((np.arange(COLOR_HEIGHTS) + 0.5) / COLOR_HEIGHTS)

@@ -77,7 +77,7 @@ M = TypeVar("M", bound=Model)
 
 @dataclass(frozen=True)
 class Need:
-    """What numbers of a process are needed for, and the key of the file that asks for it."""
+    """What numbers of a process are needed for, and the key of the file that requires it."""
 
     path: str
     what: str

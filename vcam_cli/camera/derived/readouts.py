@@ -68,7 +68,7 @@ def readouts(camera: Camera) -> tuple[Readout, ...]:
 
 
 def metered(camera: Camera) -> Camera:
-    """Return the camera with the one readout that exposure and ISO speed go by.
+    """Return the camera with the one readout that sets exposure and ISO speed.
 
     It is the large photodiode's at its lowest gain; of a camera with one readout the camera itself.
     """

@@ -74,12 +74,12 @@ def check_layers(camera: Camera) -> None:
     if not camera.scene.has_distances:
         return
     if not camera.optics.is_lens:
-        message = "without a lens all light falls on the sensor at once, whatever its distance"
+        message = "without a lens no layer is imaged, at any distance"
         place = PATH if isinstance(source, Layers) else DEPTH
         raise bad(place, message, "use a flat source, or give a lens")
     if not isinstance(source, Layers):
         if isinstance(camera.scene.extent, Extent):
-            message = "a picture with depth covers the array, whatever lies how far away"
+            message = "a picture with depth always covers the array"
             raise bad(("scene", "extent"), message, "remove it")
         return
     if isinstance(camera.scene.extent, Extent):
@@ -92,6 +92,6 @@ def check_layers(camera: Camera) -> None:
             remedy = "put the layer further away, or use a shorter focal length"
             problems.add((*PATH, number, "distance"), message, remedy)
         if math.isinf(layer.distance) and layer.width is not None:
-            message = "what is infinitely far has no width in meters"
+            message = "an object at infinity has no width in meters"
             problems.add((*PATH, number, "width"), message, "remove it: the layer fills the frame")
     problems.raise_if_any()

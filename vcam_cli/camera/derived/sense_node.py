@@ -106,7 +106,7 @@ def reset_voltage(camera: CameraModel, made: Process, need: Need) -> float:
     if threshold >= supply:
         raise bad(
             "pixel.technology.thresholds.reset",
-            f"a threshold of {threshold:.6g} V passes nothing of a supply of {supply:.6g} V",
+            f"a threshold of {threshold:.6g} V blocks a supply of {supply:.6g} V",
             "lower it, or raise the supply",
         )
     return supply - threshold

@@ -100,7 +100,7 @@ def transfer_curve(camera: CameraModel, swing: float, full_well: float) -> Curve
     fall = np.linspace(0, swing, POINTS)
     reset = _reset_voltage(camera, swing)
     if swing < SMALLEST_SWING * abs(reset):
-        message = f"a swing of {swing:.4g} V is nothing beside a reset voltage of {reset:.4g} V"
+        message = f"a swing of {swing:.4g} V is negligible against a reset voltage of {reset:.4g} V"
         raise bad(PATH, message, "give a larger full well or voltage swing")
     electrons = fall / swing * full_well
     if given.capacitance == "junction":

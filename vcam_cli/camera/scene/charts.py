@@ -29,7 +29,7 @@ class Uniform(Chart):
 
 
 class Dark(Chart):
-    """Nothing: a cap on the lens, for dark frames."""
+    """No light: a capped lens, for dark frames."""
 
     chart: Literal["dark"] = key("which chart", example="dark")
 
@@ -62,7 +62,7 @@ class Csf(Chart):
     phase: Angle = key("phase at the left edge", example="0 deg", default=0.0)
     max_contrast: Fraction = key("contrast at the top", default=1.0)
     modulation: Literal["luminance", "red-green", "blue-yellow"] = key(
-        "what the contrast is in: light and dark, or two colors of one luminance under D65",
+        "modulated quantity: luminance, or two colors of equal luminance under D65",
         default="luminance",
     )
 
@@ -130,7 +130,7 @@ class DeadLeaves(Chart):
     """Overlapping disks of random size and reflectance: the statistics of natural images."""
 
     chart: Literal["dead-leaves"] = key("which chart", example="dead-leaves")
-    seed: Seed = key("which arrangement of leaves", default=1)
+    seed: Seed = key("seed of the arrangement of leaves", default=1)
     colorchecker: Fraction = key(
         "height of a ColorChecker in the middle over the chart's height; 0 = none",
         example=0.4,

@@ -22,7 +22,7 @@ _FORMS = (
 
 
 class FlickerSpec(Model):
-    """How the brightness of a lamp goes up and down, about a mean that is the scene's level."""
+    """Modulation of a lamp over time, about the scene's level as the mean."""
 
     frequency: Annotated[float, Quantity("frequency", above=0, most=1e9)] = key(
         "of the light: twice the mains frequency for lamps of alternating current",
@@ -35,7 +35,7 @@ class FlickerSpec(Model):
         default=0.0,
     )
     duty: Annotated[float | None, Percentage(above=0, most=1)] = key(
-        "of lamps that are switched: bright part of a period; by default the light is a sinusoid",
+        "duty cycle of a pulsed lamp; by default the light is a sinusoid",
         example="50 %",
         default=None,
     )
@@ -45,7 +45,7 @@ class Lamp(Model):
     """A lamp that may flicker."""
 
     flicker: Annotated[FlickerSpec | None, mapping(FlickerSpec)] = key(
-        "how the light goes up and down; the same at all wavelengths",
+        "modulation of the light over time, equal at all wavelengths",
         example={"frequency": "100 Hz", "depth": "30 %"},
         default=None,
     )
@@ -65,7 +65,7 @@ class LampName(YamlType):
 
 
 class Named(Lamp):
-    """A lamp by its name, where more is said of it."""
+    """A lamp by its name, with flicker."""
 
     lamp: Annotated[str, LampName()] = key(
         "its CIE name, or equal-energy", example="FL2", default="D65"
@@ -89,7 +89,7 @@ class LampFile(CurveFile, Lamp):
 
 
 class LampTable(CurveTable, Lamp):
-    """The relative spectral power of a lamp, written out."""
+    """The relative spectral power of a lamp, as a table."""
 
 
 _LampForm = Named | Blackbody | Monochromatic | LampFile | LampTable

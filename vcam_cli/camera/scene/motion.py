@@ -14,7 +14,7 @@ TurningSpeed = Annotated[float, Quantity("turning_speed", least=-1e6, most=1e6)]
 
 
 class SceneMotion(Model):
-    """Motion of a scene across the view, as it is seen in the picture."""
+    """Motion of a scene, in the orientation of the displayed picture."""
 
     x: Speed = key("to the right, in the scene's plane", example="0.5 m/s", default=0.0)
     y: Speed = key("down, in the scene's plane", example="0.5 m/s", default=0.0)
@@ -31,7 +31,7 @@ class SceneMotion(Model):
 
 
 MaybeMotion = Annotated[SceneMotion | None, mapping(SceneMotion)]
-MOTION = key("how it moves during the exposure", example={"x": "0.5 m/s"}, default=None)
+MOTION = key("motion during the exposure", example={"x": "0.5 m/s"}, default=None)
 """The key of every source."""
 
 
@@ -44,7 +44,7 @@ class MovingSource(Model):
 
 
 class CameraMotion(Model):
-    """Turning of the camera about its lens, at constant speeds or as a gyroscope recorded it."""
+    """Rotation of the camera about its lens, at constant speeds or from a gyroscope's record."""
 
     pan: TurningSpeed = key("to the right", example="10 deg/s", default=0.0)
     tilt: TurningSpeed = key("upward", example="10 deg/s", default=0.0)
@@ -68,11 +68,11 @@ class CameraMotion(Model):
     def _is_one(self) -> Self:
         for name in ("pan", "tilt", "roll"):
             if self.file is not None and getattr(self, name):
-                message = "is a constant speed beside a file of angles"
-                raise refusal((name,), message, "take one of them out")
+                message = "is a constant speed in addition to a file of angles"
+                raise refusal((name,), message, "remove one of them")
         return self
 
     @property
     def moves(self) -> bool:
-        """Whether it turns over time, as far as that is known without its file."""
+        """Whether it turns over time; a file counts as motion without being read."""
         return bool(self.pan or self.tilt or self.roll or self.file)

@@ -26,7 +26,7 @@ _LUMINANCE = Quantity("luminance", least=0, words={"from-file": "from-file"})
 
 
 class Scene(Model):
-    """What the camera looks at."""
+    """The scene before the camera."""
 
     source: Annotated[Source, ByWords(read_source, Source, telling=("kind", "chart"))] = key(
         "a chart, an image file, a hyperspectral file, or layers of charts and images",
@@ -39,9 +39,9 @@ class Scene(Model):
         default=None,
     )
     luminance: Annotated[float | Literal["from-file"] | None, _LUMINANCE] = key(
-        "of a perfect white diffuser (of the display's white, for images that emit; of the file's "
-        "white, or else its brightest samples, for files of radiances); from-file leaves such a "
-        "file as bright as it is",
+        "luminance of a perfect white diffuser (of the display's white, for images that emit; "
+        "of the file's white, or else its brightest samples, for files of radiances); from-file"
+        " keeps the file's radiances",
         example="100 cd/m2",
         default=None,
     )
@@ -72,7 +72,7 @@ class Scene(Model):
         default="sensor",
     )
     camera_motion: Annotated[CameraMotion | None, mapping(CameraMotion)] = key(
-        "how the camera turns during the exposure", example={"pan": "10 deg/s"}, default=None
+        "rotation of the camera during the exposure", example={"pan": "10 deg/s"}, default=None
     )
     wavelengths: Wavelengths = key(
         "range of wavelengths simulated",

@@ -32,7 +32,7 @@ class DepthMap(Model):
         " Z, of an .exr, .png, .tif, .pfm; a .npy of rows x columns; inf is the sky",
         example="depth.exr",
     )
-    unit: Length = key("the length that a value of 1 stands for", example="1 mm", default=1.0)
+    unit: Length = key("length represented by a value of 1", example="1 mm", default=1.0)
 
 
 def _depth_map(given: Any) -> Any:
@@ -50,7 +50,7 @@ _COUNT = Whole(least=1, most=10**9, example="512")
 
 
 class Crop(Model):
-    """A rectangle of a picture, upright, in its samples."""
+    """An upright rectangle of a picture, in samples."""
 
     row: Annotated[int, _SAMPLE] = key("the first row, from 0 at the top", example=0, default=0)
     column: Annotated[int, _SAMPLE] = key("the first column, from 0 left", example=0, default=0)
@@ -71,28 +71,28 @@ class ImageFile(MovingSource):
     motion: MaybeMotion = MOTION
     file: File = key("any image file that OpenImageIO reads", example="photo.png")
     encoding: Annotated[str, Choice("auto", "srgb", "linear")] = key(
-        "how the file codes light: auto (what it says itself: ICC profile, PNG cICP, gAMA and"
-        " cHRM, EXR chromaticities, Radiance EXPOSURE and PRIMARIES, EXIF; else srgb, for .exr,"
-        " .hdr and .pfm linear), srgb, linear; the latter two are in the primaries of Rec. 709",
+        "encoding of the file: auto (from its ICC profile, PNG cICP, gAMA and cHRM, EXR "
+        "chromaticities, Radiance EXPOSURE and PRIMARIES, EXIF; else srgb, for .exr, .hdr and "
+        ".pfm linear), srgb, linear; the latter two use the primaries of Rec. 709",
         default="auto",
     )
     white: Positive = key("value in the file that has the stated luminance", default=1.0)
     model: Literal["auto", "reflectance", "laser", "rgb-display", "mallett"] = key(
-        "what channels mean: auto (one is reflectance, three are mallett), reflectance (one), "
-        "laser (450, 550 and 650 nm, equal planes = equal radiance in W), rgb-display (the "
-        "primaries of the camera file's display), mallett (the smooth reflectances that "
-        "have these sRGB colors under D65)",
+        "spectral model of the channels: auto (one: reflectance, three: mallett), reflectance "
+        "(one), laser (450, 550 and 650 nm, equal planes = equal radiance in W), rgb-display "
+        "(the primaries of the camera file's display), mallett (smooth reflectances with these "
+        "sRGB colors under D65)",
         default="auto",
     )
     crop: Annotated[Crop | None, mapping(Crop)] = key(
-        "the part of the picture that is the scene; default all of it",
+        "part of the picture used as the scene; default all of it",
         example={"row": 100, "column": 200, "rows": 512, "columns": 512},
         default=None,
     )
 
     depth: Annotated[DepthMap | None, Either(_depth_map, str | DepthMap)] = key(
-        "a file of the distance along the axis at every sample [m], or {file: z.png, unit: 1 mm}:"
-        " the picture is cut into layers by it, each with its own sharpness",
+        "file of distances along the axis, one per sample [m], or {file: z.png, unit: 1 mm}: "
+        "the picture is split into depth layers, each with its own defocus",
         example="depth.exr",
         default=None,
     )
@@ -127,7 +127,7 @@ _MaybeName = Annotated[str | None, VariableName()]
 
 
 class Variables(Model):
-    """Names of what a MATLAB file holds."""
+    """Variable names in a MATLAB file."""
 
     radiance: _MaybeName = key(
         "the variable of radiances (h, w, bands) in W/(sr m2 nm)", example="rad", default=None
@@ -157,22 +157,22 @@ class Hyperspectral(MovingSource):
         example="scene.exr",
     )
     channels: Annotated[Mapping[str, float] | None, Either(_channels, dict[str, Wavelength])] = key(
-        "of an .exr that names its channels in its own way, as renderers do: the wavelength of"
-        " each, radiances in W/(sr m2 nm)",
+        "wavelengths of the channels of an .exr with other channel names, such as a renderer's;"
+        " radiances in W/(sr m2 nm)",
         example={"w400": "400 nm", "w450": "450 nm"},
         default=None,
     )
 
     variables: Annotated[Variables | None, mapping(Variables)] = key(
-        "of a .mat that is no scene of ISETCam: the names of what it holds, a field of a structure"
-        " as scene.rad",
+        "variable names in a .mat that is not an ISETCam scene; a field of a structure as "
+        "scene.rad",
         example={"radiance": "rad", "wavelength": "bands"},
         default=None,
     )
 
     depth: Annotated[str | DepthMap | None, Either(_channel_or_map, str | DepthMap)] = key(
-        "of an .exr: the name of its channel of distances along the axis [m]; or {file: depth.exr}:"
-        " the scene is cut into layers by it, each with its own sharpness",
+        "name of the .exr's channel of distances along the axis [m]; or {file: depth.exr}: the "
+        "scene is split into depth layers, each with its own defocus",
         example="dd.y.T",
         default=None,
     )

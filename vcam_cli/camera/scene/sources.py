@@ -83,7 +83,7 @@ def _lengths(place: tuple[float, float]) -> list[str]:
 
 
 class SceneLayer(Model):
-    """A flat thing at its own distance, square to the axis."""
+    """A flat layer at its own distance, perpendicular to the axis."""
 
     source: Annotated[
         LayerSource, ByWords(_layer_source, LayerSource, telling=("kind", "chart"))
@@ -92,13 +92,13 @@ class SceneLayer(Model):
         "from lens to layer, or infinity", example="0.6 m"
     )
     mask: Annotated[str | None, FileName()] = key(
-        "an image of its opacity, from black (not there) to white, over the whole layer; of a file"
-        " with alpha its alpha",
+        "an opacity image, from black (transparent) to white (opaque), over the whole layer; "
+        "of an image with alpha its alpha channel",
         example="mug.png",
         default=None,
     )
     width: MaybeLength = key(
-        "width of the layer at its distance; not given: it fills the frame",
+        "width of the layer at its distance; default: it fills the frame",
         example="0.3 m",
         default=None,
     )
@@ -122,7 +122,7 @@ class SceneLayer(Model):
             message = "a layer has one distance"
             raise refusal(("source", "depth"), message, "remove it, or give the image by itself")
         if source.motion is not None:
-            message = "a layer moves as a whole"
+            message = "a layer has one motion"
             raise refusal(("source", "motion"), message, "write motion beside source")
         if self.width is None and self.position != (0.0, 0.0):
             message = "a layer that fills the frame has no place of its own"
@@ -142,13 +142,13 @@ def _layers(given: Any) -> tuple[SceneLayer, ...]:
 
 
 class Layers(Model):
-    """Flat layers one behind the other: each hides what is behind it, and has its own sharpness."""
+    """Flat layers at their own distances, nearer before farther ones, each with its defocus."""
 
     kind: Literal["layers"] = key("what kind of source this is", example="layers")
     layers: Annotated[
         tuple[SceneLayer, ...], Either(_layers, list[SceneLayer], yaml_form=to_yaml)
     ] = key(
-        "the layers, nearest first; what none of them covers is black",
+        "the layers, nearest first; uncovered background is black",
         example=[{"source": {"kind": "chart", "chart": "uniform"}, "distance": "1 m"}],
     )
 
@@ -159,7 +159,7 @@ class Layers(Model):
 
     @property
     def motion(self) -> None:
-        """Motion of the scene as a whole: there is none, each layer has its own."""
+        """None: each layer has its own motion."""
         return None
 
 

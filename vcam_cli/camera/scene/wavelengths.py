@@ -1,4 +1,4 @@
-"""The part of the spectrum that is simulated."""
+"""Simulated wavelengths."""
 
 from typing import Annotated, Self
 
@@ -12,7 +12,7 @@ from vcam_cli.spectra.spectrum import Outside
 
 
 class Wavelengths(Model):
-    """The part of the spectrum that is simulated."""
+    """Simulated wavelengths."""
 
     start: Wavelength = key("shortest wavelength", example="380 nm", default=380e-9)
     stop: Wavelength = key("longest wavelength", example="780 nm", default=780e-9)
@@ -23,8 +23,8 @@ class Wavelengths(Model):
         default=None,
     )
     outside: Outside = key(
-        "what holds where the table of a measured spectrum ends within start..stop: an error, "
-        "zero, or its end values; a spectrum may say it for itself",
+        "values of a measured spectrum whose table ends within start..stop: an error, zero, or "
+        "its end values; a spectrum's own `outside` has priority",
         example="hold",
         default="error",
     )

@@ -93,13 +93,13 @@ def _knees(given: Any) -> tuple[Knee, ...]:
 
 
 class Companding(Model):
-    """Codes of fewer bits: straight from knee to knee, rounded."""
+    """Piecewise-linear compression of codes between knees, rounded."""
 
     knees: Annotated[
         tuple[Knee, ...],
         Either(_knees, list[Knee], yaml_form=lambda knees: [list(knee) for knee in knees]),
     ] = key(
-        "[code of the ADC, code that is written], rising; straight between, from [0, 0] on [DN]",
+        "[code of the ADC, compressed code], rising; linear between, starting at [0, 0] [DN]",
         example=[[1023, 1023], [65535, 4095]],
     )
 
@@ -112,29 +112,31 @@ class Adc(Model):
     """
 
     bits: Annotated[int, Whole(least=1, most=24, example="10")] = key("resolution", default=10)
-    kind: Literal["linear", "logarithmic"] = key("its curve", default="linear")
+    kind: Literal["linear", "logarithmic"] = key("transfer curve of the ADC", default="linear")
     offset: Annotated[float | Mapping[str, float] | None, BLACK] = key(
-        "the code for no signal, the black level (pedestal), of all pixels or of each color of a"
-        " Bayer mosaic, {R: 66 DN, G: 64 DN, B: 61 DN}; auto = the fewest codes that keep four"
-        " standard deviations of the dark noise above 0",
+        "black level (pedestal): the code at zero signal, of all pixels or of each color of a "
+        "Bayer mosaic, {R: 66 DN, G: 64 DN, B: 61 DN}; auto = the fewest codes that keep four "
+        "standard deviations of the dark noise above 0",
         unit="DN",
         example="auto",
         default=None,
     )
     full_scale: Annotated[float | None, Quantity("voltage", above=0, words={"auto": None})] = key(
-        "volts at the highest number; auto = voltage_swing x readout.gain, whatever exposure.gain",
+        "input voltage of the highest code; auto = voltage_swing x readout.gain, independent of"
+        " exposure.gain",
         unit="V",
         example="auto",
         default=None,
     )
     gain: Annotated[float | None, Quantity("adc_gain", above=0)] = key(
-        "codes per electron (K of EMVA 1288) at exposure.gain 1, in place of full_scale",
+        "system gain K of EMVA 1288, in codes per electron at exposure.gain 1; in place of "
+        "full_scale",
         example="0.25 DN/e",
         default=None,
     )
     noise: Annotated[float, Quantity("dn", least=0)] = key(
-        "temporal noise of one conversion behind the gain, rms; referred to the pixel it falls as"
-        " exposure.gain rises; rounding comes on top",
+        "temporal noise of one conversion behind the gain, rms; input-referred, it falls as "
+        "exposure.gain rises; quantization noise is added to it",
         unit="DN",
         example="2 DN",
         default=0.0,
@@ -146,8 +148,7 @@ class Adc(Model):
     )
 
     companding: Annotated[Companding | None, word_or(Companding, {"none": None})] = key(
-        "codes compressed to fewer bits, piecewise linear; made linear again where the processing"
-        " begins",
+        "piecewise-linear compression of codes to fewer bits; the processing linearizes them first",
         example={"knees": [[1023, 1023], [65535, 4095]]},
         default=None,
     )

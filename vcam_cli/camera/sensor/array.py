@@ -66,26 +66,26 @@ class Positions(Model):
         example="pixels.csv",
     )
     origin: Literal["center", "corner"] = key(
-        "center: the optical axis, which is the middle of the picture; corner: the upper-left "
-        "corner of the array, whose middle the axis meets",
+        "center: the optical axis, at the middle of the array; corner: the upper-left corner of"
+        " the array",
         default="center",
     )
 
 
 class Binning(Model):
-    """Pixels that are read as one."""
+    """Binning of adjacent pixels."""
 
     rows: Annotated[int, Whole(least=1, most=64, example="2")] = key("in a column", example=2)
     columns: Annotated[int, Whole(least=1, most=64, example="2")] = key("in a row", example=2)
     kind: Literal["charge", "voltage", "digital"] = key(
-        "what is joined: charges (added before they are read), voltages (averaged, then read), or"
-        " digital codes (added)",
+        "domain of binning: charges (added before readout), voltages (averaged, then read), or "
+        "digital codes (added)",
         default="charge",
     )
 
     @property
     def count(self) -> int:
-        """Pixels that are read as one."""
+        """Number of pixels that are read as one."""
         return self.rows * self.columns
 
     @property
@@ -193,7 +193,7 @@ class Array(Model):
         default=None,
     )
     binning: Annotated[Binning | None, word_or(Binning, {"none": None})] = key(
-        "pixels that are read as one", example="none", default=None
+        "binning of adjacent pixels", example="none", default=None
     )
 
     rules = (
@@ -234,7 +234,7 @@ class Array(Model):
     @model_validator(mode="after")
     def _binning_has_neighbors(self) -> Self:
         if self.binning is not None and self.binning.count > 1 and self.is_scattered:
-            message = "joins neighbors in rows and columns, and these pixels have none"
+            message = "needs pixels in rows and columns; these are at free positions"
             remedy = "write binning: none, or another pattern"
             raise refusal(("binning",), message, remedy)
         return self

@@ -159,8 +159,8 @@ def _read_kernel(given: Any) -> Kernel:
     total = math.fsum(values)
     if abs(total - 1) > SUM:
         raise ValueError(
-            f"the shares of the kernel add up to {total:.9g}, not 1: no charge is lost or made;"
-            " set the one in the center to what is left"
+            f"the kernel's weights add up to {total:.9g}, not 1: crosstalk conserves charge;"
+            " set the central weight to 1 less the others"
         )
     return tuple(tuple(values[row * width : (row + 1) * width]) for row in range(len(rows)))
 
@@ -169,7 +169,7 @@ _BY_WAVELENGTH = Annotated[Kernels | None, CrosstalkShare(by_wavelength=True)]
 
 
 class Crosstalk(Model):
-    """What a pixel gives to its neighbors: a share to each of the four nearest, or a kernel."""
+    """Crosstalk to neighbors: a fraction to each of the four nearest, or a kernel."""
 
     optical: _BY_WAVELENGTH = key(
         "light that passes a pixel's filter and ends in a neighbor: a share to each of the four"
@@ -184,8 +184,8 @@ class Crosstalk(Model):
         default=None,
     )
     interpixel_capacitance: Annotated[Kernels | None, CrosstalkShare(by_wavelength=False)] = key(
-        "signal that a neighbor's sense node shows by the capacitance between them, shot noise and"
-        " all: a share to each of the four nearest, or a kernel",
+        "signal, with its shot noise, coupled to a neighbor's sense node by the capacitance "
+        "between them: a fraction to each of the four nearest, or a kernel",
         example="0.5 %",
         default=None,
     )

@@ -109,10 +109,10 @@ def _point(item: tuple[Any, Any]) -> tuple[float, float]:
 
 
 class HeavyTailedNoise(Model):
-    """Noise of a readout with more large values than a normal distribution has."""
+    """Read noise with heavier tails than a normal distribution."""
 
     rms: Annotated[float | NoiseTable | None, NoiseByGain()] = key(
-        "standard deviation, beside that of read_noise; or a table by exposure.gain as there",
+        "standard deviation, in addition to read_noise; or a table by exposure.gain as there",
         unit="e",
         example="3 e",
         default=None,
@@ -139,27 +139,27 @@ class HeavyTailedNoise(Model):
 
 
 class CorrelatedRowNoise(Model):
-    """Noise that whole rows share, and that neighboring rows share in part: bands."""
+    """Row noise correlated between neighboring rows: banding."""
 
-    rms: Electrons = key("standard deviation, beside that of row_noise", example="1 e")
+    rms: Electrons = key("standard deviation, in addition to row_noise", example="1 e")
     correlation: Annotated[float, Number(least=0, below=1, example="0.9")] = key(
-        "of neighboring rows; n rows apart it is its n-th power", example=0.9, default=0.9
+        "correlation of neighboring rows; of rows n apart its n-th power", example=0.9, default=0.9
     )
 
 
 class TelegraphNoise(Model):
     """Traps in the transistors of some pixels, each filled in some frames and empty in others."""
 
-    fraction: Percent = key("pixels that have a trap", example="2 %")
+    fraction: Percent = key("fraction of pixels with a trap", example="2 %")
     amplitude: Electrons = key(
         "step of a filled trap, mean over the traps, whose steps are distributed exponentially",
         example="10 e",
     )
-    occupancy: Percent = key("share of the time that a trap is filled", example="50 %", default=0.5)
+    occupancy: Percent = key("fraction of time that a trap is filled", example="50 %", default=0.5)
 
 
 class PatternShading(Model):
-    """The part of the fixed pattern that changes slowly over the array."""
+    """Shading: low-frequency part of the fixed pattern."""
 
     offset: Electrons = key("rms over the array of the offsets", example="2 e", default=0.0)
     gain: Percent = key("rms over the array of the gains", example="0.5 %", default=0.0)

@@ -28,18 +28,18 @@ class Dual(Model):
     """Every pixel in a left and a right half."""
 
     separation: Annotated[float, Percentage(above=0, most=1)] = key(
-        "of a half's light, the share through its own half of the lens less that through the other:"
-        " 100 % of ideal halves, less where light between the two is shared",
+        "of a half-pixel's light, the share through its own half of the lens minus the share "
+        "through the other: 100 % for ideal halves",
         example="100 %",
         default=1.0,
     )
 
 
 class Masked(Model):
-    """Single pixels whose left or right half is covered, left and right in turn along a row."""
+    """Single pixels with the left or right half covered, alternating along a row."""
 
     period: Annotated[tuple[int, int], _pair(_PERIOD)] = key(
-        "from one to the next, in rows and columns", example=[16, 16], default=(16, 16)
+        "distance between masked pixels, in rows and columns", example=[16, 16], default=(16, 16)
     )
     offset: Annotated[tuple[int, int], _pair(_OFFSET)] = key(
         "row and column of the first", example=[4, 4], default=(0, 0)
@@ -47,13 +47,13 @@ class Masked(Model):
 
 
 class PhaseDetection(Model):
-    """Pixels that see one half of the lens: all of them, or single ones."""
+    """Phase-detection pixels, which see one half of the lens: all or single ones."""
 
     dual: Annotated[Dual | None, mapping(Dual)] = key(
-        "every pixel in two halves", example={"separation": "100 %"}, default=None
+        "every pixel split into two halves", example={"separation": "100 %"}, default=None
     )
     masked: Annotated[Masked | None, mapping(Masked)] = key(
-        "single pixels of which a half is covered",
+        "single pixels with a half covered",
         example={"period": [16, 16], "offset": [4, 4]},
         default=None,
     )
@@ -73,7 +73,7 @@ def _phase_detection(given: Any) -> PhaseDetection:
             raise ValueError("needs one of dual and masked; write dual, or {masked: {..}}")
         return found
     raise ValueError(
-        f"{describe(given)} is none of none, dual, {{dual: {{separation: 80 %}}}}, and"
+        f"{describe(given)} is not one of none, dual, {{dual: {{separation: 80 %}}}}, and"
         " {masked: {period: [16, 16], offset: [4, 4]}}"
     )
 

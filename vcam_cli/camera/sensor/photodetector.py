@@ -66,11 +66,11 @@ class AtTemperature(Model):
     """Where the value of a dark current, or of its density, holds."""
 
     temperature: MaybeSiliconTemperature = key(
-        "at which it holds; default the pixel's", example="300 K", default=None
+        "temperature of the given value; default the pixel's", example="300 K", default=None
     )
     doubling: Annotated[float | Literal["silicon"], DOUBLING] = key(
-        "rise of temperature that doubles it; silicon: by the band gap (8.5 K at 300 K, 3.9 K at"
-        " 200 K)",
+        "temperature rise that doubles it; silicon: by the band gap (8.5 K at 300 K, 3.9 K at "
+        "200 K)",
         example="8 K",
         default=8.0,
     )
@@ -125,10 +125,10 @@ class ChargeDiffusion(Model):
 
 
 class Photodetector(Model):
-    """What in a pixel collects light."""
+    """The photodetector of a pixel."""
 
     kind: Literal["ndiff-psub", "nwell-psub", "photogate", "pinned"] = key(
-        "how it is built", default="ndiff-psub"
+        "type of the photodetector", default="ndiff-psub"
     )
     fill_factor: Annotated[float | None, Number(above=0, most=1, example="0.3")] = key(
         "photodetector area / (width x height of the pixel): centered, of the pixel's shape; "

@@ -57,7 +57,7 @@ class ChargeTransfer(Model):
 
 
 class Timing(Model):
-    """Clocks of the readout, from which `vcam plan` has the frame rate."""
+    """Clocks of the readout, from which `vcam plan` computes the frame rate."""
 
     pixel_time: MaybeTime = key(
         "of one pixel at an output; default of a ccd: as fast as its charge transfer allows, of"
@@ -66,13 +66,13 @@ class Timing(Model):
         default=None,
     )
     row_time: MaybeTime = key(
-        "to bring a row to the foot of its columns", example="10 us", default=None
+        "row time: transfer of a row to the column circuits", example="10 us", default=None
     )
     conversion_time: Annotated[float, Quantity("time", least=0, most=1e9)] = key(
         "of the ADCs in all pixels of a dps", example="1 ms", unit="ms", default=0.0
     )
     outputs: Annotated[int, Whole(least=1, most=10_000, example="1")] = key(
-        "pixels that leave the array at a time", default=1
+        "number of parallel outputs", default=1
     )
 
 
@@ -89,19 +89,19 @@ class Readout(Model):
         "volts at the full well", example="1.38 V", default=None
     )
     full_well: Annotated[float | None, Quantity("charge", above=0)] = key(
-        "electrons at which a pixel is full: signal and noise are cut off there; voltage_swing /"
-        " conversion_gain, or enough by itself; the saturation capacity of EMVA 1288, where its"
-        " noise begins to fall, lies just below",
+        "full-well capacity: signal and noise are clipped at it; default voltage_swing / "
+        "conversion_gain; the saturation capacity of EMVA 1288, where the noise begins to fall,"
+        " is slightly lower",
         example="69 ke",
         default=None,
     )
     transfer_curve: Annotated[TransferCurve | None, word_or(TransferCurve, {"linear": None})] = key(
-        "from charge to the output of the pixel: linear, or its capacitance and source follower",
+        "charge to pixel output: linear, or by its capacitance and source follower",
         example="linear",
         default=None,
     )
     gain: Positive = key(
-        "analog gain of the fixed readout chain; the photographer's is exposure.gain", default=1.0
+        "fixed analog gain of the readout chain; exposure.gain is the adjustable one", default=1.0
     )
     gains: Annotated[tuple[float, ...], GAINS] = key(
         "conversion gains with which every pixel is read in one exposure, times exposure.gain, and"
@@ -110,13 +110,13 @@ class Readout(Model):
         default=(),
     )
     merge: Literal["snr", "switch"] = key(
-        "how several readouts become one: snr, by inverse variance of those that do not saturate;"
-        " or switch, the highest gain that does not saturate",
+        "merging of several readouts: snr, by inverse variance of the unsaturated ones; or "
+        "switch, the highest unsaturated gain",
         default="snr",
     )
     small: Annotated[SmallPhotodiode | None, word_or(SmallPhotodiode, {"none": None})] = key(
-        "split pixel: a second photodiode of little light, read, merged and written like a further"
-        " gain (dn.small)",
+        "split pixel: a second, less sensitive photodiode, read, merged and written like a "
+        "further gain (dn.small)",
         example={"sensitivity": "1 %", "full_well": "60 ke"},
         default=None,
     )
@@ -145,20 +145,20 @@ class Readout(Model):
     heavy_tailed_noise: Annotated[
         HeavyTailedNoise | None, word_or(HeavyTailedNoise, {"none": None})
     ] = key(
-        "temporal noise of a readout with large values more often than normal noise has",
+        "temporal read noise with heavier tails than a normal distribution",
         example={"rms": "3 e", "shape": -0.1},
         default=None,
     )
     correlated_row_noise: Annotated[
         CorrelatedRowNoise | None, word_or(CorrelatedRowNoise, {"none": None})
     ] = key(
-        "temporal, of rows that resemble their neighbors",
+        "temporal row noise, correlated between neighboring rows",
         example={"rms": "1 e", "correlation": 0.9},
         default=None,
     )
     telegraph_noise: Annotated[TelegraphNoise | None, word_or(TelegraphNoise, {"none": None})] = (
         key(
-            "random telegraph noise of the pixels that have a trap",
+            "random telegraph noise of pixels with a trap",
             example={"fraction": "2 %", "amplitude": "10 e"},
             default=None,
         )
@@ -183,7 +183,9 @@ class Readout(Model):
     )
 
     timing: Annotated[Timing | None, mapping(Timing)] = key(
-        "clocks, for the frame rate of vcam plan alone", example={"row_time": "10 us"}, default=None
+        "readout clocks, used only for the frame rate of vcam plan",
+        example={"row_time": "10 us"},
+        default=None,
     )
 
     @property
@@ -206,7 +208,7 @@ class Readout(Model):
     @model_validator(mode="after")
     def _check_agreement(self) -> Self:
         if self.merge == "switch" and not self.gains and self.small is None:
-            message = "there is one readout, and nothing to merge"
+            message = "needs several readouts; this camera has one"
             raise refusal(("merge",), message, "add gains: [1, 8], or remove merge")
         g, v, well = self.conversion_gain, self.voltage_swing, self.full_well
         if g is not None and v is not None and well is not None and abs(v / g / well - 1) > AGREE:
@@ -216,7 +218,7 @@ class Readout(Model):
 
 
 class FixedPattern(Model):
-    """What differs from pixel to pixel and column to column, the same in every frame."""
+    """Fixed-pattern noise of pixels and columns, equal in every frame."""
 
     offset_pixel: Electrons = key(
         "spread of the pixels' offsets (also: dsnu)",
@@ -238,7 +240,9 @@ class FixedPattern(Model):
     )
     dark: Percent = key("spread of the pixels' dark currents", example="0 %", default=0.0)
     shading: Annotated[PatternShading | None, word_or(PatternShading, {"none": None})] = key(
-        "slow differences over the array", example={"offset": "2 e", "gain": "0.5 %"}, default=None
+        "low-frequency offset and gain differences over the array",
+        example={"offset": "2 e", "gain": "0.5 %"},
+        default=None,
     )
 
     rules = (at_most_one("offset_pixel", "dsnu"), at_most_one("gain_pixel", "prnu"))
@@ -248,14 +252,14 @@ class Defects(Model):
     """Pixels that do not work."""
 
     hot: Fraction = key(
-        "fraction of pixels that read the full well whatever the light, or have the dark current"
-        " that hot_current says",
+        "fraction of pixels that read the full well at any light, or, with hot_current, have a"
+        " raised dark current",
         example=1e-4,
         default=0.0,
     )
     hot_current: Annotated[float | None, Number(above=0, most=1e9, example="200")] = key(
-        "dark current of hot pixels over that of the others, mean of an exponential distribution:"
-        " it grows with time and temperature as theirs does; without it they read the full well",
+        "dark current of hot pixels over that of the others, mean of an exponential distribution;"
+        " scales with time and temperature; default: hot pixels read the full well",
         example=200,
         default=None,
     )
@@ -285,7 +289,7 @@ class Layer(Model):
 
 
 class Stack(Model):
-    """The layers above the photodetector: a tunnel that shades it."""
+    """Layers above the photodetector, which cause pixel vignetting."""
 
     passivation: Layer = key("the upper layer", example={"thickness": "0.7 um", "index": 2.0})
     oxide: Layer = key("the lower layer", example={"thickness": "6 um", "index": 1.46})
@@ -310,7 +314,7 @@ class Microlens(Model):
 
 
 def _is_determined(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
-    """Require what a technology could have filled in, where there is none."""
+    """Without a technology, require the keys that it would have set."""
     if "technology" in given:
         return
     detector, readout = given.get("photodetector"), given.get("readout", {})
@@ -331,7 +335,7 @@ def _is_determined(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
         return
     message = (
         "the readout is not determined: two of conversion_gain, voltage_swing and full_well are "
-        "needed (photodetector.capacitance may stand for conversion_gain)"
+        "needed (photodetector.capacitance may replace conversion_gain)"
     )
     remedy = "add conversion_gain: 20 uV/e" if known else "add two of them"
     if "conversion_gain" in known:
@@ -346,7 +350,7 @@ class Pixel(Model):
         "readout architecture", default="aps-3t"
     )
     technology: Annotated[TechnologyChoice | None, CHOICE] = key(
-        "fills in what is not given: a name, or {from: name, ...} with changes",
+        "defaults of process parameters: a name, or {from: name, ...} with changes",
         example="cmos-0.35um",
         default=None,
     )
@@ -355,10 +359,10 @@ class Pixel(Model):
     gap_x: Gap = key("between pixels of a row; pitch = width + gap", example="0 um", default=0.0)
     gap_y: Gap = key("between pixels of a column", example="0 um", default=0.0)
     photodetector: Photodetector = key(
-        "what collects light", example={"fill_factor": 0.3, "quantum_efficiency": 0.5}
+        "the photodetector", example={"fill_factor": 0.3, "quantum_efficiency": 0.5}
     )
     readout: Readout = key(
-        "from electrons to volts",
+        "readout from electrons to volts",
         example={"conversion_gain": "20 uV/e", "full_well": "69 ke"},
         default=Readout,
     )
@@ -367,19 +371,19 @@ class Pixel(Model):
     )
     defects: Defects = key("pixels that do not work", example={"hot": 0}, default=Defects)
     stack: Annotated[Stack | None, word_or(Stack, {"none": None})] = key(
-        "layers above the photodetector, which shade it", example="none", default=None
+        "layers above the photodetector, which vignette it", example="none", default=None
     )
     microlens: Annotated[Microlens | None, word_or(Microlens, {"none": None})] = key(
         "a lens on every pixel", example="none", default=None
     )
     phase_detection: Annotated[PhaseDetection | None, PHASE_DETECTION] = key(
-        "pixels that see one half of the lens: dual (each in a left and a right half), or"
-        " {masked: {period: [16, 16], offset: [4, 4]}}; output.phase writes what they see",
+        "phase-detection pixels: dual (each a left and a right half), or {masked: {period: [16,"
+        " 16], offset: [4, 4]}}; output.phase writes their signals",
         example="dual",
         default=None,
     )
     crosstalk: Annotated[Crosstalk | None, word_or(Crosstalk, {"none": None})] = key(
-        "what a pixel gives to its neighbors", example="none", default=None
+        "crosstalk to neighbors", example="none", default=None
     )
     blooming: Percent = key(
         "share of the charge beyond the full well that fills neighbors along the column; a drain"
@@ -388,8 +392,7 @@ class Pixel(Model):
         default=0.0,
     )
     temperature: SiliconTemperature = key(
-        "of the sensor: kTC noise follows it, and dark current that is given at a temperature of"
-        " its own",
+        "sensor temperature: sets kTC noise, and scales dark current given at another temperature",
         example="300 K",
         default=300.0,
     )

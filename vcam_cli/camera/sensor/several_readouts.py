@@ -13,16 +13,16 @@ _GAIN = Number(above=0, most=1e6, example="8")
 
 
 class SmallPhotodiode(Model):
-    """The second photodiode of a split pixel, read beside the large one."""
+    """The second, small photodiode of a split pixel."""
 
     sensitivity: Annotated[float, Percentage(above=0, most=1)] = key(
-        "light that it gets, over that of the large photodiode", example="1 %"
+        "sensitivity relative to the large photodiode", example="1 %"
     )
     full_well: Annotated[float, Quantity("charge", above=0)] = key(
-        "electrons that it holds", example="60 ke"
+        "its full-well capacity", example="60 ke"
     )
     conversion_gain: Annotated[float | None, Quantity("conversion_gain", above=0)] = key(
-        "volts per electron at the same ADC; default as many as fill the ADC with its full well",
+        "volts per electron at the same ADC; default: its full well fills the ADC",
         example="49 uV/e",
         default=None,
     )

@@ -32,7 +32,7 @@ _Exponent = Annotated[float | None, Number(least=-10, most=10, example="1")]
 
 
 class Thresholds(Model):
-    """Voltages that make the swing: (supply - reset - gate-source) - (bias - bias gate)."""
+    """Thresholds that set the swing: (supply - reset - gate-source) - (bias - bias gate)."""
 
     reset: _Voltage = key("threshold of the reset transistor", example="0.8 V", default=None)
     bias: _Voltage = key("bias voltage", example="0.9 V", default=None)
@@ -68,7 +68,7 @@ class Junction(Model):
     hole_diffusivity: _Diffusivity = key("of holes", example="12 cm2/s", default=None)
     electron_diffusivity: _Diffusivity = key("of electrons", example="36 cm2/s", default=None)
     tunneling: Annotated[str | None, Choice("none", "traps")] = key(
-        "traps: the field of diffusions and wells hastens the generation of a dark current junction"
+        "traps: field-enhanced generation in diffusions and wells, for `dark_current: junction`"
         " (Hurkx 1992)",
         example="none",
         default=None,
@@ -76,7 +76,7 @@ class Junction(Model):
 
 
 class Well(Model):
-    """The n-well, which takes the place of the n-diffusion in a photodetector nwell-psub."""
+    """The n-well, which replaces the n-diffusion in a photodetector nwell-psub."""
 
     depth: MaybeLength = key(
         "depth of its junction with the substrate", example="1.5 um", default=None
@@ -106,7 +106,7 @@ class Pinned(Model):
 
 
 class Gate(Model):
-    """The gate of polysilicon, through which the light of a photogate goes."""
+    """The polysilicon gate of a photogate, which transmits the light."""
 
     thickness: MaybeGap = key("of the film", example="0.25 um", default=None)
 
@@ -177,7 +177,7 @@ class Layout(Model):
 
 
 class Scaling(Model):
-    """The power of the feature-size ratio by which a number goes when the process is scaled."""
+    """Exponents of the feature-size ratio that scale the process parameters."""
 
     lengths: _Exponent = key(
         "depths, widths, diffusion length, capacitance of the follower's gate; default 1",
@@ -248,12 +248,12 @@ class Numbers(Model):
         "reflection and stack; 1 when the camera gives a stack", example=0.75, default=None
     )
     layout: Layout = key(
-        "what of a pixel is photodetector",
+        "photodetector layout within the pixel",
         example={"border": 5.017, "transistors": 91.1},
         default=Layout,
     )
     scaling: Scaling = key(
-        "how the numbers go with the feature size",
+        "scaling of parameters with the feature size",
         example={"dark_current_perimeter": 0},
         default=Scaling,
     )
@@ -280,10 +280,10 @@ def _source(given: Any) -> Technology | str:
 
 
 class TechnologyChoice(Numbers):
-    """The technology of a camera's pixel: which one, and what is changed of it."""
+    """The technology of a camera's pixel, with changes."""
 
     from_: Annotated[Technology | str, Either(_source, str | Technology)] = key(
-        "name or path of a technology file; once read, what it says",
+        "name or path of a technology file; in run.json its content",
         example="cmos-0.35um",
         alias="from",
     )

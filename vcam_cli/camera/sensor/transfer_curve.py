@@ -60,7 +60,7 @@ def _one_way(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
 
 
 class Follower(Model):
-    """The source follower of a pixel: a gain, its transistor, or what was measured of it."""
+    """The source follower of a pixel: a gain, its transistor, or a measured curve."""
 
     gain: Annotated[float | None, Number(above=0, most=1, example="0.85")] = key(
         "the same at all voltages, at most 1", example=0.85, default=None
@@ -71,7 +71,7 @@ class Follower(Model):
         default=None,
     )
     body_effect: Annotated[float, Quantity("body_effect", least=0)] = key(
-        "by which the threshold rises with the voltage between source and bulk",
+        "rise of the threshold with the voltage between source and bulk",
         example="0.5 sqrt(V)",
         default=0.5,
     )
@@ -84,7 +84,7 @@ class Follower(Model):
         default=0.2,
     )
     table: Annotated[Points | None, VoltageTable()] = key(
-        "measured: voltage on the photodiode -> output, straight between",
+        "measured: voltage on the photodiode -> output, interpolated linearly",
         unit="V",
         example={0.5: 0.02, 1.7: 0.86},
         default=None,
@@ -106,7 +106,7 @@ class Follower(Model):
 
 
 class TransferCurve(Model):
-    """From electrons to volts where that is no straight line."""
+    """Nonlinear transfer from electrons to volts."""
 
     capacitance: Literal["constant", "junction"] = key(
         "constant, or junction: the technology's, which rises as the photodiode discharges",
@@ -122,6 +122,4 @@ class TransferCurve(Model):
         example="1.65 V",
         default=None,
     )
-    corrected: Switch = key(
-        "whether the processing knows the curve and takes it out first", default=False
-    )
+    corrected: Switch = key("whether the processing inverts the curve first", default=False)

@@ -29,9 +29,9 @@ from vcam_cli.files.optional_library import optional_library
 BYTES_PER_PIXEL = 32
 """Memory that developing takes: LibRaw's four channels of 16 bits twice, its picture, and ours."""
 MOST_STOPS = 32
-"""A file that asks for more is taken to have none [EV]."""
+"""Largest baseline exposure; a larger one in a file is ignored [EV]."""
 _BASELINE_EXPOSURE = 50730
-_REMEDY = "give a whole raw file of a camera that LibRaw knows"
+_REMEDY = "give a complete raw file of a camera that LibRaw supports"
 
 
 def develop(path: Path, yaml_path: tuple[str | int, ...] | str) -> LinearImage:

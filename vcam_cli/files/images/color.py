@@ -62,10 +62,10 @@ _PRIMARIES: dict[int, tuple[str, tuple[float, ...]]] = {
 
 @dataclass(frozen=True)
 class Coding:
-    """How codes stand for light."""
+    """How codes represent light."""
 
     name: str
-    """What says so, for the user; "srgb" and "linear-srgb" of these two."""
+    """Source of this coding, for the user; "srgb" and "linear-srgb" of these two."""
     curves: tuple[Curve, ...]
     """Linear light of codes, 1 the largest: one for all channels, or one for each."""
     to_rec709: Array | None = None
@@ -121,7 +121,7 @@ def picture_coding(
     path : Path
         The file.
     encoding : str
-        "srgb" and "linear" say so themselves, "auto" leaves it to the file.
+        "srgb" and "linear" set the encoding, "auto" leaves it to the file.
     source, spec : Any
         The file as OpenImageIO opens it, and its header.
     channels : int
@@ -169,8 +169,8 @@ def _stated(path: Path, kind: str, spec: Any, channels: int) -> tuple[Coding, li
         notes.append("EXIF calls its colors uncalibrated; they are taken as sRGB")
     if is_float:
         notes.append(
-            "its floating-point values say no encoding and are taken as coded by sRGB; write"
-            " encoding: linear where they are light"
+            "its floating-point values state no encoding and are read as sRGB; write encoding: "
+            "linear if they are linear light"
         )
     return SRGB, notes
 

@@ -149,7 +149,7 @@ class RawImage:
     exposure_time: float
     """[s]"""
     f_number: float
-    """Of the lens; inf where there is none."""
+    """Of the lens; inf without one."""
     focal_length: float
     """[m]"""
     iso: float

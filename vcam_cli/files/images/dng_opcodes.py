@@ -20,7 +20,7 @@ def gain_maps(shape: tuple[int, ...], block: tuple[int, int], gains: Array) -> b
     shape : tuple of int
         Rows and columns of the frame; with the number of colors where every pixel has all.
     block : (int, int)
-        Rows and columns of the block of colors that repeats; (1, 1) where there is none. Every
+        Rows and columns of the block of colors that repeats; (1, 1) without a mosaic. Every
         place in it has a map of its own: converters look for them so, though all are alike.
     gains : ndarray
         Factors (M, N) at places that lie evenly from edge to edge of the frame; converters

@@ -126,4 +126,4 @@ def _is_whole(path: Path) -> bool:
 
 
 def _unreadable(path: Path | str, reason: str) -> BadInput:
-    return bad((), f"cannot read {path}: {reason}", "give a whole OpenEXR file")
+    return bad((), f"cannot read {path}: {reason}", "give a complete OpenEXR file")

@@ -1,4 +1,4 @@
-"""ICC profiles: how a picture's codes stand for light, and in which primaries.
+"""ICC profiles: how a picture's codes represent light, and in which primaries.
 
 Profiles of curves and a matrix are read here, exactly and at any depth of bits; those with tables
 for every color are applied by LittleCMS, which Pillow brings for 8 bits.

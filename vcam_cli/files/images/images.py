@@ -60,7 +60,7 @@ class LinearImage:
     """The linear light of an image file."""
 
     data: np.ndarray
-    """Light over white (h, w, channels), float32; 1 or 3 channels (R, G, B), or those asked for."""
+    """Light over white (h, w, channels), float32; 1 or 3 channels (R, G, B), or those requested."""
     channels: tuple[str, ...]
     """The channels' names in the file."""
     notes: tuple[str, ...]
@@ -145,7 +145,7 @@ def open_image(path: Path) -> Iterator[Any]:
     if source is None:
         reason = pending_error(oiio.geterror)
         raise _unsupported(path, reason) or UnusableFile(
-            "is no image that can be read: of no known format, or damaged"
+            "cannot be read as an image: unknown format, or damaged"
         )
     try:
         if source.format_name() == "null":
@@ -255,7 +255,7 @@ def _choose_channels(
 
 
 def _layer(names: list[str], wanted: tuple[str, ...]) -> str:
-    """Return the prefix of the layer that holds the picture; "" where there is none.
+    """Return the prefix of the layer that holds the picture; "" without a layer.
 
     Renderers write channels such as ViewLayer.Combined.R, with other layers (Blender manual,
     "Output Properties", OpenEXR MultiLayer).
@@ -267,7 +267,7 @@ def _layer(names: list[str], wanted: tuple[str, ...]) -> str:
         return ""
     if len(whole) > 1 and len(combined) != 1:
         shown = ", ".join(sorted(layer.rstrip(".") for layer in whole))
-        raise UnusableFile(f"has several layers of color ({shown})", "save the one you mean alone")
+        raise UnusableFile(f"has several layers of color ({shown})", "save only the intended one")
     return (combined or whole)[0]
 
 
@@ -489,5 +489,5 @@ def upright(data: np.ndarray, spec: Any, notes: list[str]) -> np.ndarray:
 def _remarks(spec: Any) -> list[str]:
     notes = []
     if abs(spec.get_float_attribute("PixelAspectRatio", 1.0) - 1) > 1e-3:
-        notes.append("its pixels are not square but taken as square")
+        notes.append("its pixels are not square; they are read as square")
     return notes

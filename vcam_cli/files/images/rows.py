@@ -98,7 +98,7 @@ class RowWriter:
         if self._next_row != self._spec.height:
             raise ValueError(f"{self._next_row} of {self._spec.height} rows were written")
         if not closed or reason or not self._is_whole(self._temporary):
-            raise self._failure(reason or "the file is not whole")
+            raise self._failure(reason or "the file is incomplete")
 
     def _failure(self, reason: str) -> CannotDo:
         with suppress(OSError):
@@ -106,7 +106,7 @@ class RowWriter:
                 return cannot_write(self._path, OSError(errno.ENOSPC, "disk full"))
         numbers = (errno.EFBIG, errno.EDQUOT, errno.EACCES, errno.EPERM, errno.EROFS, errno.EIO)
         number = next((n for n in numbers if os.strerror(n) in reason), 0)
-        return cannot_write(self._path, OSError(number, "it could not be written whole"))
+        return cannot_write(self._path, OSError(number, "it could not be written completely"))
 
 
 def image_spec(height: int, width: int, channels: int, sample: str) -> oiio.ImageSpec:
@@ -133,7 +133,7 @@ def set_attributes(spec: oiio.ImageSpec, attributes: Mapping[str, Attribute]) ->
 
 
 def pending_error(geterror: Callable[[], str]) -> str:
-    """Return OpenImageIO's pending error, which clears it; "" when there is none."""
+    """Return OpenImageIO's pending error, which clears it; "" without an error."""
     try:
         text = geterror()
     except UnicodeDecodeError:  # it quotes bytes of the file

@@ -59,7 +59,7 @@ def read_depth(
     path : Path or str
         An image with one channel, or with a channel Z; or a .npy of rows x columns.
     unit : float
-        Length that a value of 1 stands for [m]; codes of whole numbers are values, too.
+        Length represented by a value of 1 [m]; codes of whole numbers are values, too.
     yaml_path : tuple
         Key that names the file.
     size : tuple of int

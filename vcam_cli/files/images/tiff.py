@@ -25,7 +25,7 @@ and "x" is bytes without a meaning in TIFF."""
 
 COLORS = {"R": 0, "G": 1, "B": 2, "C": 3, "M": 4, "W": 6}
 """Color -> its number in the tag CFAPattern of TIFF/EP (ISO 12234-2). Y is 5 there, yellow; here it
-may be the luminance of a pixel without filter, which is none of the tag's colors."""
+may be the luminance of a pixel without filter, which the tag has no color for."""
 SOFTWARE = f"vcam {vcam_cli.__version__}"
 GRAY, RGB, YCBCR = 1, 2, 6
 """PhotometricInterpretation."""
@@ -87,7 +87,7 @@ def image_tags(
     bits : int
         Bits of a sample.
     compression : int, optional
-        Number of the compression; 1 is none.
+        Number of the compression; 1: uncompressed.
     reduced : bool, optional
         Whether it is a smaller copy of another image in the file.
     tile : (int, int), optional
@@ -142,7 +142,7 @@ def write_directory(path: Path | str, first: Directory) -> None:
 
 @dataclass(frozen=True)
 class _Writer:
-    """Writes directories: tags before samples, so that a file that is cut off still says so."""
+    """Writes directories: tags before samples, so that a truncated file is recognized."""
 
     file: BinaryIO
     offset: str
@@ -218,5 +218,5 @@ def mosaic_tags(block: Sequence[Sequence[str]]) -> list[Tag]:
 
 
 def whole_numbers(values: Array, highest: float) -> Array:
-    """Return codes as uint16, or uint32 where the highest one asks for it."""
+    """Return codes as uint16, or uint32 where the highest one needs it."""
     return values.astype(np.uint16 if highest < 1 << 16 else np.uint32)

@@ -90,4 +90,6 @@ def _codec(program: str) -> tuple[str, ...]:
 
 def _failure(said: bytes) -> CannotDo:
     words = " ".join(said.decode(errors="replace").split())[-LAST_WORDS:]
-    return CannotDo(f"ffmpeg wrote no video: {words}", "take ffmpeg off the PATH to go without")
+    return CannotDo(
+        f"ffmpeg wrote no video: {words}", "remove ffmpeg from the PATH to skip the video"
+    )

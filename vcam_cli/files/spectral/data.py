@@ -27,7 +27,7 @@ MOST = 1e100
 MOST_LIGHT = 1e30
 """The largest radiance [W/(sr m2 m)] or reflectance: 32 bits end at 3.4e38."""
 MOST_WAVELENGTHS = 10**6
-"""A file may hold so many wavelengths at most."""
+"""Largest number of wavelengths in a file."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class SpectralData:
     offset: float | np.ndarray = 0.0
     """The offset of all bands, or one for each."""
     no_data: float | None = None
-    """The value that stands for missing data; perhaps NaN."""
+    """The value that marks missing data; may be NaN."""
     used: np.ndarray | None = None
     """Whether each band (bands,) is in use; None for all."""
     white: np.ndarray | None = None

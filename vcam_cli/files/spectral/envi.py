@@ -76,7 +76,7 @@ def open_envi(path: Path) -> SpectralData:
 
 
 def data_file(path: Path) -> Path:
-    """Return the raw file of a header. Raise UnusableFile where there is none."""
+    """Return the raw file of a header. Raise UnusableFile without one."""
     for ending in ENDINGS:
         for spelt in (ending, ending.upper()):
             found = path.with_suffix(spelt)
@@ -153,7 +153,7 @@ def _wavelengths(keys: dict[str, str]) -> np.ndarray:
     unit = keys.get("wavelength units", "")
     if unit.lower() not in LENGTHS:
         raise UnusableFile(
-            f"has wavelength units {unit!r}, which say nothing",
+            f"has wavelength units {unit!r}, which are unknown",
             "write wavelength units = Nanometers, or Micrometers",
         )
     return _list(keys, "wavelength") * LENGTHS[unit.lower()]

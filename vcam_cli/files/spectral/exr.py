@@ -158,7 +158,7 @@ def _channels(names: Sequence[str]) -> tuple[list[tuple[float, int]], list[str]]
     shifting = sum(bool(_BISPECTRAL.fullmatch(name)) for name in names)
     if shifting:
         notes.append(
-            f"its {shifting} bispectral channels are not used: what fluoresces is darker here"
+            f"its {shifting} bispectral channels are ignored: fluorescent objects are too dark"
         )
     return sorted(found), notes
 

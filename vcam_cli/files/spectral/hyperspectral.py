@@ -24,7 +24,7 @@ MOST_NEGATIVE = 0.01
 MOST_OVER_WHITE = 1e9
 """Light over a white: the sun is 1e4 times as bright as a sheet that it lights."""
 _BLOCK = 32  # rows
-_REMEDY = "give a whole spectral .exr, ENVI .hdr, ISETCam .mat, .npz or multichannel .tif"
+_REMEDY = "give a complete spectral .exr, ENVI .hdr, ISETCam .mat, .npz or multichannel .tif"
 
 YamlPath = tuple[str | int, ...] | str
 Order = slice | np.ndarray

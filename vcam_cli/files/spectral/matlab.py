@@ -4,8 +4,8 @@ The layout is that of "MAT-File Format" (The MathWorks, R2024a): a header of 128
 elements of a tag (type, bytes) and data, each variable one element, packed by zlib or not.
 
 Why a reader of our own: SciPy's believes what a file says of itself. A damaged one can end the
-process or take all memory. Here every size is held against the bytes that are there, only the
-variables asked for are unpacked, and no more of them than fits the memory.
+process or take all memory. Here every size is checked against the bytes of the file, only the
+requested variables are unpacked, and no more of them than fits the memory.
 """
 
 import math
@@ -36,7 +36,7 @@ DEEPEST, LONGEST_NAME = 8, 64
 PIECE, ASKED = 1 << 16, 1 << 26
 """Bytes that are unpacked at once, and above which the free memory is checked."""
 SUSPECT, MOST_RATIO = 1 << 30, 300
-"""A variable of more bytes may be so many times as large as its packed form, at most."""
+"""Largest compression ratio of a variable of more bytes than that."""
 NO_NUMBERS = np.empty(0, object)
 """The value of text, cells and all else that is not read."""
 
@@ -47,14 +47,14 @@ Value = np.ndarray | dict[str, Any]
 def read_variables(path: Path, names: Collection[str]) -> dict[str, Value]:
     """Return some of a file's variables: arrays in MATLAB's order of axes, structures as dicts.
 
-    Raise UnusableFile for a file that is none or is damaged, CannotDo without enough memory.
+    Raise UnusableFile for another or a damaged file, CannotDo without enough memory.
     """
     with (
         open(path, "rb") as file,
         closing(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)) as m,
     ):
         if m[126:128] not in (b"IM", b"MI"):
-            raise UnusableFile("is no whole MATLAB file of version 5 to 7")
+            raise UnusableFile("is no complete MATLAB file of version 5 to 7")
         order: Order = "<" if m[126:128] == b"IM" else ">"
         try:
             return _variables(_Bytes(m, order, HEADER, len(m)), names, path)
@@ -148,7 +148,7 @@ def _unpack(packed: _Bytes, names: Collection[str], path: Path) -> _Bytes | None
         if _head(_beginning(packed))[2] not in names:
             return None
     except _Damaged:
-        return None  # nothing of ours: it has so long a name, or so many axes
+        return None  # not a spectral variable: its name is too long, or it has too many axes
     unpack, out = zlib.decompressobj(), bytearray()
     for start in range(packed.position, packed.stop, PIECE):
         given = packed.data[start : min(start + PIECE, packed.stop)]

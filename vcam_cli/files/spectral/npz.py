@@ -40,7 +40,7 @@ def open_npz(path: Path) -> SpectralData:
             if "white" in shapes and quantity == "radiance":
                 white = _list(archive, shapes, "white") * PER_NM
     except (zipfile.BadZipFile, EOFError, zlib.error):
-        raise UnusableFile("is no whole npz file", _WRITE) from None
+        raise UnusableFile("is no complete npz file", _WRITE) from None
     shape = shapes[quantity]
     if len(shape) != 3:
         raise UnusableFile(f"its {quantity} has {len(shape)} axes, not (h, w, bands)", _WRITE)
@@ -97,7 +97,7 @@ def _array_header(file: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype]:
     version = np.lib.format.read_magic(file)
     begins = file.tell()
     if int.from_bytes(file.read(2 if version == (1, 0) else 4), "little") > LONGEST_HEADER:
-        raise ValueError("a header too long")  # which NumPy would read before it says so
+        raise ValueError("a header too long")  # which NumPy would read before it reports it
     file.seek(begins)
     if version == (1, 0):
         return np.lib.format.read_array_header_1_0(file)

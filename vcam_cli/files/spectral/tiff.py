@@ -8,7 +8,7 @@ TIFF has no tag for wavelengths, so they are given as CSV, either in a file besi
     410,0.0001                             410,1
 
 One row a channel (or a page, where each has one channel), in their order. The second column is
-what a stored value of 1 stands for: a reflectance, or a radiance in W/(sr m2 nm). So 16-bit codes
+the value of a stored 1: a reflectance, or a radiance in W/(sr m2 nm). So 16-bit codes
 with 10000 for a reflectance of 1 have 0.0001 in every row.
 """
 
@@ -77,7 +77,7 @@ def _read(path: Path, pages: int) -> np.ndarray:
 def _table(
     sidecar: Path, description: str
 ) -> tuple[np.ndarray, Literal["radiance", "reflectance"], np.ndarray]:
-    """Return the wavelengths [m], what the values are, and what a stored 1 stands for."""
+    """Return the wavelengths [m], the quantity of the values, and the value of a stored 1."""
     write = f"write {sidecar.name} with the lines wavelength_nm,reflectance and 400,1 and so on"
     text = description
     if sidecar.is_file():
@@ -97,4 +97,6 @@ def _table(
                 quantity,
                 finite_numbers([row[1] for row in cells], f"its {quantity}"),
             )
-    raise UnusableFile("has no table of wavelengths, beside it or in its ImageDescription", write)
+    raise UnusableFile(
+        "has no table of wavelengths in a CSV file or in its ImageDescription", write
+    )

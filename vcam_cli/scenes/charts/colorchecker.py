@@ -1,7 +1,7 @@
 """The ColorChecker Classic: 24 patches, six by four, on a black card.
 
 Proportions of the printed chart: patches of 40 mm, 5 mm of black between them, 7.5 mm around.
-As large as fits the frame, never stretched; what is left around the card is a dark surround.
+As large as fits the frame, never stretched; the rest of the frame is a dark surround.
 Reflectances: N. Ohta's measurement (1997), `spectra.colorchecker`.
 """
 

@@ -36,7 +36,7 @@ LUMINANCES = (0.2126, 0.7152, 0.0722)
 FIRST_COLOR_SHARES = {"red-green": (1.0, None, 0.5), "blue-yellow": (None, None, 1.0)}
 """Shares of red, green and blue in the first of two colors; the second has the rest.
 
-None stands for what makes the luminances equal.
+None is replaced by the value that makes the luminances equal.
 """
 
 

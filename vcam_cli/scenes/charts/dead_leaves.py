@@ -45,7 +45,7 @@ is seen where takes time and gigabytes: larger cells are divided."""
 AT_ONCE = 1 << 18
 """Cells that are painted at once where many leaves are seen: bounds the memory of temporaries."""
 KEPT_CELLS = 1 << 22
-"""Cells of a picture, parts counted, up to which what is seen in them is kept for other lenses. Of
+"""Cells of a picture, parts counted, up to which their visible leaves are kept for other lenses. Of
 more, the last bands of a picture would drop its first."""
 SUMMED, SUMMED_FAR = 32, 4
 """Parts along each side of a cell from which on its average is read from sums over one period, of
@@ -58,7 +58,7 @@ DARKEST = 0.25
 """Lower bound of a leaf's own factor, which is uniform between this and 1."""
 
 FACTORS = 16
-"""Factors of leaves that stand for all, where the mean over them is taken."""
+"""Factors of leaves over which the mean is taken."""
 
 PIGMENTS = {
     "dark skin": 4,
@@ -194,7 +194,7 @@ class PlacedLeaves(Chart):
     divided: int = MOST
     """How often cells are divided in which edges meet."""
     keep: bool = False
-    """Whether what is seen is kept for cameras that see it on the same cells."""
+    """Whether visible leaves are kept for cameras that see them on the same cells."""
 
     def paint(
         self,
@@ -230,8 +230,8 @@ class DeadLeaves(Chart):
     divided: int = MOST
     """How often cells are divided in which edges meet."""
     keep: bool | None = None
-    """Whether what is seen is kept for cameras that see it on the same cells; None until the whole
-    grid is known."""
+    """Whether visible leaves are kept for cameras that see them on the same cells; None until the
+    whole grid is known."""
     edge_seconds = property(lambda self: EDGE_SECONDS[0] + EDGE_SECONDS[1] * self.divided)
     undivided = property(lambda self: self.unit / FINEST)
 
@@ -249,7 +249,7 @@ class DeadLeaves(Chart):
     ) -> "DeadLeaves | PlacedLeaves":
         """Return the leaves that may be seen on the cells; those of `hidden` are not looked at.
 
-        What is not seen is found on cells of `step` times `step`: a leaf behind one that covers
+        Hidden leaves are found on cells of `step` times `step`: a leaf behind one that covers
         such a cell is behind it in all of its cells, so that no cell changes.
         """
         parts = self._parts(x_edges, y_edges)
@@ -357,7 +357,7 @@ def _period_cells(seed: int, mix: tuple[tuple[float, ...], ...], dtype: np.dtype
 
 
 def _periodic_averages(plane: Array, edges: Array, axis: int) -> Array:
-    """Return averages along an axis of what is known on the finest cells of one period.
+    """Return averages along an axis of values on the finest cells of one period.
 
     The edges of what is averaged are in units of the frame's longer side. Light is taken to be even
     within each cell, so that its running sum is straight.

@@ -36,7 +36,7 @@ class HdrPatches(Chart):
     """Patches on cloth, and a lamp above them."""
 
     levels: Array
-    """Level of each patch (rows, columns), 0 where there is none."""
+    """Level of each patch (rows, columns), 0 without a patch."""
     left: Array
     """Left edges of the patches (columns,) [m]."""
     top: Array

@@ -52,7 +52,7 @@ class PointGrid(Chart):
         """Return the Fourier series of a lattice of discs.
 
         It is pi d^2 / 4 p^2 times 2 J1(x) / x, with x = pi d sqrt(k^2 + l^2) / p; a cosine with
-        k > 0 stands for k and -k.
+        k > 0 represents k and -k.
 
         Parameters
         ----------
