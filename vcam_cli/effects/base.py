@@ -54,7 +54,20 @@ a sensor or counts when it is narrower than a wave of light."""
 
 
 def of_kind(effects: Iterable[Effect], *kinds: type[Kind]) -> tuple[Kind, ...]:
-    """Return the effects of one kind, or of several, in their order."""
+    """Return the effects of one kind, or of several, in their order.
+
+    Parameters
+    ----------
+    effects : iterable of Effect
+        Effects in their order.
+    *kinds : type of Kind
+        Classes; an effect of any of them is returned.
+
+    Returns
+    -------
+    tuple of Kind
+        The effects that are instances of a kind.
+    """
     return tuple(effect for effect in effects if isinstance(effect, kinds))
 
 
@@ -89,7 +102,20 @@ class SignalLevels:
 
 
 def switched_off(camera: Camera, name: str) -> bool:
-    """Return whether the file leaves this effect out, whatever else it says."""
+    """Return whether the file leaves this effect out, whatever else it says.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+    name : str
+        Name of the effect.
+
+    Returns
+    -------
+    bool
+        True where `effects` in the file has `NAME: off`.
+    """
     return isinstance(camera.effects, dict) and camera.effects.get(name) == "off"
 
 
@@ -117,7 +143,25 @@ class Effect(ABC):
     @classmethod
     @abstractmethod
     def from_camera(cls, camera: Camera, geometry: Geometry) -> Effect | None:
-        """Return the effect with this camera's numbers, or None where the camera has none."""
+        """Return the effect with this camera's numbers, or None where the camera has none.
+
+        Parameters
+        ----------
+        camera : Camera
+            Camera as its file describes it.
+        geometry : Geometry
+            Geometry of the array.
+
+        Returns
+        -------
+        Effect or None
+            The effect; None where the camera has none.
+
+        Raises
+        ------
+        BadInput
+            Where the file contradicts itself in what the effect needs.
+        """
 
     @abstractmethod
     def describe(self) -> str:
@@ -129,9 +173,17 @@ class Effect(ABC):
         return 0.0
 
     def mean_error(self, signal: SignalLevels) -> float | None:
-        """Return the largest rms change of the mean signal by leaving it out [electrons].
+        """Return the largest rms change of the mean signal that leaving it out makes.
 
-        It is None where no bound is known before the light is.
+        Parameters
+        ----------
+        signal : SignalLevels
+            Signal that is known before the frame is computed.
+
+        Returns
+        -------
+        float or None
+            Error [electrons]; None where its bound is unknown before the light is computed.
         """
         return None
 
@@ -204,11 +256,33 @@ class Effect(ABC):
         return None
 
     def part_of_exposure(self, start: float, stop: float) -> Effect:
-        """Return what of it acts from `start` to `stop` after a line's exposure begins [s]."""
+        """Return the effect as it acts during a part of the exposure.
+
+        Parameters
+        ----------
+        start, stop : float
+            Times after a line's exposure begins [s].
+
+        Returns
+        -------
+        Effect
+            The same kind of effect; the effect itself where it does not depend on time.
+        """
         return self
 
     def seen_by_turned(self, angle: float) -> Effect:
-        """Return it as a scene meets it that is turned clockwise by an angle [rad]."""
+        """Return the effect as a turned scene meets it.
+
+        Parameters
+        ----------
+        angle : float
+            Angle of the scene, clockwise [rad].
+
+        Returns
+        -------
+        Effect
+            The turned effect; the effect itself where its direction has no influence.
+        """
         return self
 
     def parts_in_pixels(self) -> tuple[Effect, ...]:
@@ -229,13 +303,34 @@ class Blur(Effect):
 
     @abstractmethod
     def cutoff(self, wavelength: float) -> float:
-        """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
+        """Return the frequency from which the transfer is zero.
+
+        Parameters
+        ----------
+        wavelength : float
+            Wavelength [m].
+
+        Returns
+        -------
+        float
+            Frequency [cycles/m]; inf where there is no such frequency.
+        """
 
     @abstractmethod
     def otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
-        """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: (m, n).
+        """Return the transfer at all pairs of frequencies. It is 1 at frequency 0.
 
-        It is 1 at frequency 0.
+        Parameters
+        ----------
+        fx, fy : Array
+            Frequencies (n,) along x and (m,) along y [cycles/m].
+        wavelength : float
+            Wavelength [m].
+
+        Returns
+        -------
+        Array
+            Transfer (m, n) without unit, complex where the blur is not symmetric.
         """
 
     def spread(self, wavelengths: Array) -> Array:
@@ -246,13 +341,36 @@ class Blur(Effect):
         return np.full(len(wavelengths), np.inf)
 
     def largest(self, frequency: Array, wavelength: float) -> Array:
-        """Return a bound (n,) on the contrast of waves in any direction; 1 where none is known."""
+        """Return a bound on the contrast of waves in any direction.
+
+        Parameters
+        ----------
+        frequency : Array
+            Spatial frequencies (n,) [cycles/m].
+        wavelength : float
+            Wavelength [m].
+
+        Returns
+        -------
+        Array
+            Bound (n,) without unit; 1 where no lower bound is known.
+        """
         return np.ones(frequency.shape)
 
     def kept_bytes(self, wavelengths: Array, by_harmonics: bool = False) -> int:
-        """Return the memory that its transfer takes at wavelengths (J,) [m] beside tables.
+        """Return the memory that its transfer takes beside tables.
 
-        It may be asked for on planes, or only for its harmonics of the direction.
+        Parameters
+        ----------
+        wavelengths : Array
+            Wavelengths (J,) [m].
+        by_harmonics : bool, optional
+            Whether only the harmonics of the direction are needed, not planes.
+
+        Returns
+        -------
+        int
+            Memory [bytes].
         """
         return 0
 
@@ -290,10 +408,36 @@ class RadialTransfer(Blur):
 
     @abstractmethod
     def otf(self, frequency: Array, wavelength: float) -> Array:
-        """Return the transfer at `frequency` [cycles/m] and `wavelength` [m]; 1 at frequency 0."""
+        """Return the transfer at spatial frequencies.
+
+        Parameters
+        ----------
+        frequency : Array
+            Lengths of the frequencies, of any shape [cycles/m].
+        wavelength : float
+            Wavelength [m].
+
+        Returns
+        -------
+        Array
+            Transfer without unit, in the shape of `frequency`; 1 at frequency 0.
+        """
 
     def spectral_otf(self, frequency: Array, wavelengths: Array) -> Array:
-        """Return the transfer at every wavelength (J,) [m]: (J, *shape of `frequency`)."""
+        """Return the transfer at every wavelength.
+
+        Parameters
+        ----------
+        frequency : Array
+            Lengths of the frequencies, of any shape [cycles/m].
+        wavelengths : Array
+            Wavelengths (J,) [m].
+
+        Returns
+        -------
+        Array
+            Transfer (J, *shape of `frequency`) without unit.
+        """
         return np.array([self.otf(frequency, float(w)) for w in wavelengths])
 
     def otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
@@ -333,10 +477,26 @@ class PlaneTransfer(Blur):
     """
 
     def harmonics(self, frequency: Array, wavelengths: Array) -> Array:
-        """Return the transfer as harmonics of the direction, complex A_m (J, n, m).
+        """Return the transfer as harmonics of the direction; `pupil_harmonics` defines them.
 
-        Frequencies (n,) lie evenly from 0 [cycles/m], for wavelengths (J,) [m]; `pupil_harmonics`
-        says what they are. Those of a `FieldTransfer` have them, which are turned with the azimuth.
+        Blurs of a `FieldTransfer` have them: they are turned with the azimuth.
+
+        Parameters
+        ----------
+        frequency : Array
+            Frequencies (n,) in even steps from 0 [cycles/m].
+        wavelengths : Array
+            Wavelengths (J,) [m].
+
+        Returns
+        -------
+        Array
+            Complex harmonics A_m (J, n, m) without unit.
+
+        Raises
+        ------
+        TypeError
+            For a blur that has no harmonics.
         """
         raise TypeError(f"{type(self).__name__} has no harmonics of the direction")
 
@@ -361,12 +521,32 @@ class FieldTransfer(Effect):
     def rings(self, count: int) -> tuple[Zone, ...]:
         """Return blurs on that half-axis, whose weights sum to 1 in every place.
 
-        `count` is the number of places from center to corner; there are more where that is known
-        not to be enough. All are `RadialTransfer`, or all are `PlaneTransfer`.
+        All are `RadialTransfer`, or all are `PlaneTransfer`.
+
+        Parameters
+        ----------
+        count : int
+            Number of places from center to corner; a field that needs more has more.
+
+        Returns
+        -------
+        tuple of Zone
+            Blurs with their weights over the field.
         """
 
     def zones(self, count: int) -> tuple[Zone, ...]:
-        """Return blurs that are turned already, whose weights sum to 1 in every place."""
+        """Return blurs that are turned already, whose weights sum to 1 in every place.
+
+        Parameters
+        ----------
+        count : int
+            Number of places from center to corner, as in `rings`.
+
+        Returns
+        -------
+        tuple of Zone
+            Blurs with their weights over the field.
+        """
         return self.rings(count)
 
     @property
@@ -398,11 +578,33 @@ class SeparableTransfer(Effect):
 
     @abstractmethod
     def along_x(self, frequency: Array) -> Array:
-        """Return the transfer along x at `frequency` [cycles/m]."""
+        """Return the transfer along x.
+
+        Parameters
+        ----------
+        frequency : Array
+            Frequencies along x (n,) [cycles/m].
+
+        Returns
+        -------
+        Array
+            Transfer (n,) without unit.
+        """
 
     @abstractmethod
     def along_y(self, frequency: Array) -> Array:
-        """Return the transfer along y at `frequency` [cycles/m]."""
+        """Return the transfer along y.
+
+        Parameters
+        ----------
+        frequency : Array
+            Frequencies along y (n,) [cycles/m].
+
+        Returns
+        -------
+        Array
+            Transfer (n,) without unit.
+        """
 
 
 class Warp(Effect):
@@ -440,7 +642,23 @@ class Warp(Effect):
     def images(
         self, x: Array, y: Array, wavelength: float, time: Array | float
     ) -> tuple[Array, Array]:
-        """Return where places x, y of the unwarped image are seen: the inverse of `places`."""
+        """Return where places x, y of the unwarped image are seen: the inverse of `places`.
+
+        Parameters
+        ----------
+        x, y : Array
+            Places in the unwarped image right of the axis and below it, of shapes that broadcast
+            [m].
+        wavelength : float
+            Wavelength [m].
+        time : Array or float
+            Time, of a shape that broadcasts with theirs [s].
+
+        Returns
+        -------
+        tuple of Array
+            Places on the sensor [m].
+        """
 
     @property
     def changes_with_time(self) -> bool:
@@ -474,9 +692,19 @@ class StillWarp(Warp):
 
     @abstractmethod
     def displacements(self, wavelengths: Array) -> Array:
-        """Return how far it displaces what the sensor sees, at most, at wavelengths (J,): (J,) [m].
+        """Return the largest distance by which it displaces the image on the sensor.
 
-        Of what it sees in the unwarped image, and of what of that is seen elsewhere.
+        Displacements from the unwarped image to the sensor and back both count.
+
+        Parameters
+        ----------
+        wavelengths : Array
+            Wavelengths (J,) [m].
+
+        Returns
+        -------
+        Array
+            Distances (J,) [m].
         """
 
     def spread(self, wavelengths: Array) -> Array:
@@ -494,7 +722,18 @@ class Magnification(StillWarp):
 
     @abstractmethod
     def factor(self, wavelength: float) -> float:
-        """Return the factor at a wavelength [m]."""
+        """Return the magnification at a wavelength.
+
+        Parameters
+        ----------
+        wavelength : float
+            Wavelength [m].
+
+        Returns
+        -------
+        float
+            Factor without unit.
+        """
 
     def places(
         self, x: Array, y: Array, wavelength: float, time: Array | float
@@ -557,9 +796,17 @@ class Gain(Effect):
 
     @abstractmethod
     def gain(self, x: Array, y: Array) -> Array:
-        """Return the factor at the positions x (columns,), y (rows,) [m]: (rows, columns).
+        """Return the factor on the signal of pixels.
 
-        Its shape is (1, 1) where it is the same everywhere.
+        Parameters
+        ----------
+        x, y : Array
+            Positions (columns,) and (rows,) of the pixels [m].
+
+        Returns
+        -------
+        Array
+            Factor (rows, columns) without unit; (1, 1) where it is the same everywhere.
         """
 
     @property
@@ -580,10 +827,19 @@ class TemporalGain(Effect):
 
     @abstractmethod
     def gain(self, x: Array, y: Array, start: float, stop: float) -> Array:
-        """Return the mean factor from `start` to `stop` after a line's exposure begins [s].
+        """Return the mean factor during a part of the exposure. Its mean over all times is 1.
 
-        Its shape at the positions x (columns,), y (rows,) [m] is (rows or 1, columns or 1): 1
-        where it is the same along that axis. Its mean over all times is 1.
+        Parameters
+        ----------
+        x, y : Array
+            Positions (columns,) and (rows,) of the pixels [m].
+        start, stop : float
+            Times after a line's exposure begins [s].
+
+        Returns
+        -------
+        Array
+            Factor (rows or 1, columns or 1) without unit; 1 where it is the same along that axis.
         """
 
 
@@ -624,8 +880,30 @@ class Transport(Effect):
 
     @abstractmethod
     def transport(self, signal: Array) -> Array:
-        """Return what arrives of a mean signal (rows, columns), in its unit and float type."""
+        """Return the signal that arrives at the output, in the unit and float type of the signal.
+
+        Parameters
+        ----------
+        signal : Array
+            Mean signal (rows, columns).
+
+        Returns
+        -------
+        Array
+            Signal (rows, columns).
+        """
 
     @abstractmethod
     def timely_share(self, rows: int, columns: int) -> Array:
-        """Return the share (rows, columns) of a pixel's own charge that does not arrive late."""
+        """Return the share of a pixel's own charge that does not arrive late.
+
+        Parameters
+        ----------
+        rows, columns : int
+            Pixels of the array.
+
+        Returns
+        -------
+        Array
+            Share (rows, columns) without unit.
+        """

@@ -84,7 +84,18 @@ def electrical(camera: Camera) -> Electrical:
 
 
 def check(camera: Camera) -> None:
-    """Raise BadInput where the ADC has no room for the dark noise, or no usable step."""
+    """Check that the ADC has room for the dark noise, and a usable step.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Raises
+    ------
+    BadInput
+        Where it has not.
+    """
     electrical(camera)
 
 
@@ -106,7 +117,23 @@ def _check_companding(camera: Camera, found: Electrical, companding: Companding)
 
 
 def merged_saturation(camera: Camera) -> float:
-    """Return the signal at which all readouts of a camera saturate [e of the large photodiode]."""
+    """Return the signal at which all readouts of a camera saturate.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Returns
+    -------
+    float
+        Signal [electrons of the large photodiode].
+
+    Raises
+    ------
+    BadInput
+        Where a readout's circuit has no solution.
+    """
     return max(
         electrical(readout.camera).saturation / readout.sensitivity
         for readout in readouts.readouts(camera)

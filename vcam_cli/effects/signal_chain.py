@@ -51,17 +51,50 @@ class Site:
         return self.first_row + self.rows if self.array_rows is None else self.array_rows
 
     def sensor_stream(self, name: str) -> np.random.Generator:
-        """Return the generator of a named stream for this block that stays with the sensor."""
+        """Return the generator of a named stream of this block that stays with the sensor.
+
+        Parameters
+        ----------
+        name : str
+            Name of the stream.
+
+        Returns
+        -------
+        np.random.Generator
+            Generator; that of the frame where the sensor has none of its own.
+        """
         return (self.sensor or self.stream)(name)
 
     def normal(self, name: str) -> Array:
-        """Return one standard normal number a pixel, (rows, columns)."""
+        """Return one standard normal number a pixel.
+
+        Parameters
+        ----------
+        name : str
+            Name of the stream.
+
+        Returns
+        -------
+        Array
+            Numbers (rows, columns) without unit.
+        """
         if self.coarse_normals:
             return coarse_normals(self.stream(name), self.rows, self.columns, self.dtype)
         return self.stream(name).standard_normal((self.rows, self.columns), dtype=self.dtype)
 
     def normal_columns(self, name: str) -> Array:
-        """Return one standard normal number a column, the same for every block, (columns,)."""
+        """Return one standard normal number a column, the same for every block.
+
+        Parameters
+        ----------
+        name : str
+            Name of the stream.
+
+        Returns
+        -------
+        Array
+            Numbers (columns,) without unit, read-only.
+        """
         if name not in self.lines_drawn:
             drawn = self.line_stream(name).standard_normal(self.columns, dtype=self.dtype)
             drawn.setflags(write=False)
@@ -85,13 +118,34 @@ class Site:
         return self.lines_drawn[name][self.first_row : self.first_row + self.rows, None]
 
     def normal_rows(self, name: str) -> Array:
-        """Return one standard normal number a row, the same for every column, (rows, 1)."""
+        """Return one standard normal number a row, the same for every column.
+
+        Parameters
+        ----------
+        name : str
+            Name of the stream.
+
+        Returns
+        -------
+        Array
+            Numbers (rows, 1) without unit.
+        """
         return self.stream(name).standard_normal((self.rows, 1), dtype=self.dtype)
 
     def of_all_rows(self, name: str, shape: Callable[[Array], Array]) -> Array:
-        """Return the block's part (rows, 1) of a sequence over all rows of the array.
+        """Return the block's part of a sequence over all rows of the array.
 
-        `shape` makes the sequence of one standard normal number a row, in 64 bits.
+        Parameters
+        ----------
+        name : str
+            Name of the stream.
+        shape : callable
+            Makes the sequence of one standard normal number a row, both (all rows,) in 64 bits.
+
+        Returns
+        -------
+        Array
+            Part (rows, 1) of the sequence, in its unit.
         """
         if name not in self.lines_drawn:
             drawn = shape(self.line_stream(name).standard_normal(self.all_rows))
@@ -116,11 +170,37 @@ class ElectronEffect(Effect):
 
     @abstractmethod
     def apply(self, electrons: Array, site: Site) -> Array:
-        """Return the block with this effect in it, which may reuse the array [electrons]."""
+        """Return the block after this effect; it may reuse the array.
+
+        Parameters
+        ----------
+        electrons : Array
+            Block (rows, columns) [electrons].
+        site : Site
+            Block of rows and its random streams.
+
+        Returns
+        -------
+        Array
+            Block (rows, columns) [electrons].
+        """
 
 
 def electron_effects(effects: Iterable[Effect], behind_well: bool) -> tuple[ElectronEffect, ...]:
-    """Return the effects on electrons up to the full well, or those behind it."""
+    """Return the effects on electrons up to the full well, or those behind it.
+
+    Parameters
+    ----------
+    effects : iterable of Effect
+        Effects in their order.
+    behind_well : bool
+        Whether to return those behind the full well's clamp.
+
+    Returns
+    -------
+    tuple of ElectronEffect
+        The effects, in their order.
+    """
     return tuple(e for e in of_kind(effects, ElectronEffect) if e.behind_well == behind_well)
 
 
@@ -134,7 +214,18 @@ class NoiseSource(ElectronEffect):
     pixel; one at 0 is not drawn."""
 
     def without_parts(self, names: Collection[str]) -> Self:
-        """Return it with some of its parts at 0."""
+        """Return it with some of its parts at 0.
+
+        Parameters
+        ----------
+        names : collection of str
+            Names of `parts`.
+
+        Returns
+        -------
+        Self
+            The source without them.
+        """
         return self
 
     def split(self) -> tuple[Self | None, Self | None, Self | None]:
@@ -161,9 +252,19 @@ class NoiseSource(ElectronEffect):
         return False
 
     def before_shot(self, mean: Array, site: Site) -> Array:
-        """Return the block's mean signal as this source changes it [electrons].
+        """Return the block's mean signal as this source changes it; it may reuse the array.
 
-        It may reuse the array.
+        Parameters
+        ----------
+        mean : Array
+            Mean signal (rows, columns) [electrons].
+        site : Site
+            Block of rows and its random streams.
+
+        Returns
+        -------
+        Array
+            Mean signal (rows, columns) [electrons].
         """
         return mean
 
@@ -214,14 +315,37 @@ class NoiseSource(ElectronEffect):
 
 
 def noise_sources(effects: Iterable[Effect], scope: str) -> tuple[NoiseSource, ...]:
-    """Return the noise sources that are new in every 'frame', or that stay with the 'sensor'."""
+    """Return the noise sources that are new in every 'frame', or that stay with the 'sensor'.
+
+    Parameters
+    ----------
+    effects : iterable of Effect
+        Effects in their order.
+    scope : str
+        'frame' or 'sensor'.
+
+    Returns
+    -------
+    tuple of NoiseSource
+        The sources, in their order.
+    """
     return tuple(source for source in of_kind(effects, NoiseSource) if source.scope == scope)
 
 
 def total_variance(sources: Iterable[NoiseSource], signal: SignalLevels) -> Array:
-    """Return the summed variance of noise sources at each of the levels [electrons squared].
+    """Return the summed variance of noise sources at each of a scene's levels.
 
-    Of pixels that are read as one, of their mean.
+    Parameters
+    ----------
+    sources : iterable of NoiseSource
+        Noise sources.
+    signal : SignalLevels
+        Signal levels, and how pixels are read as one.
+
+    Returns
+    -------
+    Array
+        Variance (n,) [electrons squared]; of the mean of pixels that are read as one.
     """
     listed = tuple(sources)
     return np.array(
@@ -276,7 +400,18 @@ class Limit(ElectronEffect):
 
 
 def full_well(effects: Iterable[Effect]) -> float:
-    """Return the electrons of a full pixel; inf where no effect limits them."""
+    """Return the charge of a full pixel.
+
+    Parameters
+    ----------
+    effects : iterable of Effect
+        Effects in their order.
+
+    Returns
+    -------
+    float
+        Charge [electrons]; inf where no effect limits it.
+    """
     return min((limit.ceiling for limit in of_kind(effects, Limit)), default=math.inf)
 
 
@@ -294,11 +429,33 @@ class Quantizer(Effect):
 
     @abstractmethod
     def apply(self, electrons: Array) -> Array:
-        """Return the digital numbers of `electrons`, whole and of the same float type [DN]."""
+        """Return the codes of a signal.
+
+        Parameters
+        ----------
+        electrons : Array
+            Signal (rows, columns) [electrons].
+
+        Returns
+        -------
+        Array
+            Whole codes (rows, columns) in the float type of the signal [DN].
+        """
 
     @abstractmethod
     def response(self, electrons: Array) -> Array:
-        """Return the same relation before rounding and clipping [DN]."""
+        """Return the same relation before rounding and clipping.
+
+        Parameters
+        ----------
+        electrons : Array
+            Signal, of any shape [electrons].
+
+        Returns
+        -------
+        Array
+            Response in the shape of the signal [DN].
+        """
 
     def contribution(self, signal: SignalLevels, others: Sequence[Effect]) -> tuple[float, str]:
         """Return the largest share of its rounding in the temporal variance with it."""
@@ -335,21 +492,54 @@ class Quantizer(Effect):
         return float(step**2 / 12 + (step / np.pi) ** 2 * dithered.sum())
 
     def step(self, level: float) -> float:
-        """Return the width of a step of the ADC at a mean signal, both in [electrons]."""
+        """Return the width of a step of the ADC.
+
+        Parameters
+        ----------
+        level : float
+            Mean signal [electrons].
+
+        Returns
+        -------
+        float
+            Width [electrons/DN].
+        """
         ends = np.array([level, level + max(1.0, 1e-3 * level)])
         below, above = self.response(ends)
         return float((ends[1] - ends[0]) / float(above - below))
 
     @abstractmethod
     def moved(self, electrons: Array, codes: Array) -> Array:
-        """Return the signal whose response is by so many codes [DN] another one [electrons].
+        """Return the signal whose response differs from another one's by given codes.
 
         It has the float type of `electrons`, and may reuse both arrays.
+
+        Parameters
+        ----------
+        electrons : Array
+            Signal (rows, columns) [electrons].
+        codes : Array
+            Difference of the responses (rows, columns) [DN].
+
+        Returns
+        -------
+        Array
+            Signal (rows, columns) [electrons].
         """
 
     def linear(self, dn: Array) -> Array:
-        """Return what a linear ADC of the same offset and full scale has for these codes [DN].
+        """Return the codes of a linear ADC of the same offset and full scale.
 
-        It is a straight line of electrons whatever the curve is, in the same float type.
+        They are a straight line of electrons whatever the curve is.
+
+        Parameters
+        ----------
+        dn : Array
+            Codes of this ADC, of any shape [DN].
+
+        Returns
+        -------
+        Array
+            Codes in the same shape and float type [DN].
         """
         return dn

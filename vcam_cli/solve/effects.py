@@ -27,13 +27,35 @@ class CameraEffects:
     """What `effects` of the file says: "auto", "all", or name -> "auto", "on" or "off"."""
 
     def wish(self, effect: Effect) -> str:
-        """Return what the file wants of an effect it describes: on, off or auto."""
+        """Return the state in which the file wants an effect that it describes.
+
+        Parameters
+        ----------
+        effect : Effect
+            Effect that the camera has.
+
+        Returns
+        -------
+        str
+            'on', 'off' or 'auto'.
+        """
         if isinstance(self.wishes, str):
             return "on" if self.wishes == "all" else "auto"
         return self.wishes.get(effect.name, "auto")
 
     def is_off(self, name: str) -> bool:
-        """Return whether the file leaves an effect out, whatever else it says."""
+        """Return whether the file leaves an effect out, whatever else it says.
+
+        Parameters
+        ----------
+        name : str
+            Name of the effect.
+
+        Returns
+        -------
+        bool
+            True where `effects` in the file has `NAME: off`.
+        """
         return not isinstance(self.wishes, str) and self.wishes.get(name) == "off"
 
     @cached_property
@@ -49,7 +71,18 @@ class CameraEffects:
         return tuple(effect for effect in self.enabled if effect not in later)
 
     def optional(self, effects: Iterable[Effect]) -> tuple[Effect, ...]:
-        """Return those of the effects that the plan may leave out."""
+        """Return those of the effects that the plan may leave out.
+
+        Parameters
+        ----------
+        effects : iterable of Effect
+            Effects in their order.
+
+        Returns
+        -------
+        tuple of Effect
+            Removable effects that the file neither switches on nor off.
+        """
         return tuple(e for e in effects if e.removable and self.wish(e) == "auto")
 
     @property

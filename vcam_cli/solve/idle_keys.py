@@ -206,7 +206,18 @@ RULES = (
 
 
 def idle_keys(camera: Camera) -> Iterator[tuple[str, str]]:
-    """Yield the keys that can change no number, by their dotted paths, each with the reason."""
+    """Yield the keys that can change no number.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Yields
+    ------
+    tuple of str
+        Dotted path of a key, and the reason.
+    """
     for rule in RULES:
         for path in rule.paths:
             if _is_given(camera, path) and rule.is_idle(camera):
@@ -217,12 +228,34 @@ def idle_keys(camera: Camera) -> Iterator[tuple[str, str]]:
 
 
 def notes(camera: Camera) -> tuple[str, ...]:
-    """Return a note for every idle key."""
+    """Return a note for every idle key.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Returns
+    -------
+    tuple of str
+        Notes, one a key.
+    """
     return tuple(_note(path, why) for path, why in idle_keys(camera))
 
 
 def sequence_notes(remarks: Iterable[str]) -> tuple[str, ...]:
-    """Return the notes on a sequence's first frame without what holds of single frames alone."""
+    """Return the notes on a sequence's first frame without those on single frames.
+
+    Parameters
+    ----------
+    remarks : iterable of str
+        Notes on the first frame.
+
+    Returns
+    -------
+    tuple of str
+        The notes that hold for a sequence.
+    """
     single = {_note(path, FOLLOW.why) for path in FOLLOW.paths}
     return tuple(remark for remark in remarks if remark not in single)
 

@@ -26,7 +26,18 @@ class SolvedLayer:
 
 
 def solve_layer(alone: Camera) -> SolvedLayer:
-    """Return what follows from a camera that looks at one layer of its scene."""
+    """Return the geometry, effects and defocus of one layer of a scene.
+
+    Parameters
+    ----------
+    alone : Camera
+        Camera that looks at this layer only.
+
+    Returns
+    -------
+    SolvedLayer
+        Solved layer.
+    """
     solved = geometry(alone)
     shift = alone.optics.defocus + solved.focus_shift
     radius = shift / (2 * solved.working_f_number)

@@ -70,7 +70,18 @@ def light_key(camera: Camera) -> str:
 
 
 def changes_light(path: str) -> bool:
-    """Return whether a key of a camera, by its dotted path, changes the light on the sensor."""
+    """Return whether a key of a camera changes the light on the sensor.
+
+    Parameters
+    ----------
+    path : str
+        Dotted path of the key.
+
+    Returns
+    -------
+    bool
+        False for keys that act behind the light, or on files alone.
+    """
     keys = tuple(path.split("."))
     return not any(keys[: len(known)] == known for known in INDEPENDENT_KEYS)
 

@@ -15,7 +15,18 @@ LADDER = ((0.02, DRAFT), (0.005, STANDARD), (0.001, FINE), (0.0, REFERENCE))
 
 
 def camera_settings(camera: Camera) -> Settings:
-    """Return the settings for the camera's tolerance, with those that its file states itself."""
+    """Return the settings for the camera's tolerance, with those that its file states itself.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Returns
+    -------
+    Settings
+        Settings of image formation.
+    """
     accuracy = camera.accuracy
     chosen = next(s for least, s in LADDER if accuracy.tolerance >= least)
     mixing = min(chosen.mixing_tolerance, accuracy.tolerance / 10)

@@ -207,7 +207,18 @@ class Solved:
         return tuple(solve_layer(alone) for alone in layer_cameras(self.camera))
 
     def layers_at(self, distances: tuple[float, ...]) -> tuple[SolvedLayer, ...]:
-        """Return a picture with depth as layers at these distances [m]."""
+        """Return a picture with depth as layers at given distances.
+
+        Parameters
+        ----------
+        distances : tuple of float
+            Distances of the layers [m].
+
+        Returns
+        -------
+        tuple of SolvedLayer
+            Layers in the order of the distances.
+        """
         return tuple(solve_layer(camera_at(self.camera, distance)) for distance in distances)
 
     @property
@@ -251,7 +262,18 @@ class Solved:
         return replace(self, camera=self.camera.model_copy(update=changes))
 
     def at_gain(self, gain: float) -> Self:
-        """Return the same camera at another gain of the exposure."""
+        """Return the same camera at another gain of the exposure.
+
+        Parameters
+        ----------
+        gain : float
+            Gain of the exposure without unit.
+
+        Returns
+        -------
+        Self
+            Camera with the circuit and effects of that gain.
+        """
         camera = self.camera.with_exposure_gain(gain)
         if gain == self.gain:
             return replace(self, camera=camera)
@@ -259,11 +281,35 @@ class Solved:
         return replace(self, camera=camera, electrical=electrical(camera), effects=effects)
 
     def with_seed(self, seed: Seed) -> Self:
-        """Return the same camera with other random numbers."""
+        """Return the same camera with other random numbers.
+
+        Parameters
+        ----------
+        seed : Seed
+            Seeds of the sensor and of the frame.
+
+        Returns
+        -------
+        Self
+            Camera with these seeds.
+        """
         return self._with(seed=seed)
 
     def with_samples_at(self, times: tuple[float, ...], estimator: str) -> Self:
-        """Return the same camera with these times of samples [s], and this estimator."""
+        """Return the same camera with other times of samples, and another estimator.
+
+        Parameters
+        ----------
+        times : tuple of float
+            Times of the samples [s].
+        estimator : str
+            Name of the estimator of the photocurrent.
+
+        Returns
+        -------
+        Self
+            Camera with this exposure.
+        """
         update = {"captures": times, "estimator": estimator}
         return self._with(exposure=self.exposure.model_copy(update=update))
 
@@ -278,7 +324,22 @@ class Solved:
         return solve(camera.model_copy(update={"scene": scene, "effects": effects}))
 
     def timed(self, time: float, gain: float, samples: tuple[float, ...]) -> Solved:
-        """Return the camera with the time [s] and gain, or samples [s], that it chose."""
+        """Return the camera with the exposure that it chose.
+
+        Parameters
+        ----------
+        time : float
+            Exposure time [s].
+        gain : float
+            Gain without unit.
+        samples : tuple of float
+            Times of the samples [s], of an exposure with a schedule.
+
+        Returns
+        -------
+        Solved
+            Camera without automatic exposure.
+        """
         fixed = self.exposure.single(time, gain)
         if self.exposure.schedule is not None:
             fixed = self.exposure.model_copy(update={"captures": samples})
@@ -286,24 +347,68 @@ class Solved:
         return solve(camera.with_exposure_gain(gain))
 
     def with_exposure(self, exposure: Exposure) -> Self:
-        """Return the same camera, at the gain that it has, with the exposure as its file has it."""
+        """Return the same camera, at the same gain, with another exposure.
+
+        Parameters
+        ----------
+        exposure : Exposure
+            Exposure as the file has it.
+
+        Returns
+        -------
+        Self
+            Camera with this exposure.
+        """
         gain = self.gain
         camera = self.camera.model_copy(update={"exposure": exposure}).with_exposure_gain(gain)
         return replace(self, camera=camera)
 
     def with_tolerance(self, tolerance: float) -> Solved:
-        """Return the camera simulated with another tolerance, relative to full signal."""
+        """Return the camera with another tolerance.
+
+        Parameters
+        ----------
+        tolerance : float
+            Tolerance relative to full signal.
+
+        Returns
+        -------
+        Solved
+            Camera that is solved anew.
+        """
         update = {"preset": None, "tolerance": tolerance}
         accuracy = self.camera.accuracy.model_copy(update=update)
         return solve(self.camera.model_copy(update={"accuracy": accuracy}))
 
     def focused_at(self, shift: float) -> Solved:
-        """Return the camera with its lens fixed, its image plane shifted [m]."""
+        """Return the camera with its lens fixed, its image plane shifted.
+
+        Parameters
+        ----------
+        shift : float
+            Shift of the image plane [m].
+
+        Returns
+        -------
+        Solved
+            Camera that is solved anew.
+        """
         optics = self.optics.model_copy(update={"defocus": shift, "focus": "fixed"})
         return solve(self.camera.model_copy(update={"optics": optics}))
 
     def flat_at(self, distance: float) -> Solved:
-        """Return the camera before a flat scene in place of its map of depth, at a distance [m]."""
+        """Return the camera before a flat scene in place of its depth map.
+
+        Parameters
+        ----------
+        distance : float
+            Distance of the scene [m].
+
+        Returns
+        -------
+        Solved
+            Camera that is solved anew.
+        """
         return solve(flat_camera(self.camera, camera_at(self.camera, distance)))
 
 

@@ -54,9 +54,19 @@ def tukey_lambda(chance: Array, shape: float) -> Array:
 
 @lru_cache(maxsize=64)
 def tukey_lambda_spread(shape: float) -> float:
-    """Return the standard deviation of Tukey's lambda distribution without scale.
+    """Return the standard deviation of Tukey's lambda distribution of scale 1.
 
     It is the same for every block of a frame.
+
+    Parameters
+    ----------
+    shape : float
+        Shape lambda of the distribution.
+
+    Returns
+    -------
+    float
+        Standard deviation, in units of the scale.
     """
     from scipy.stats import tukeylambda
 

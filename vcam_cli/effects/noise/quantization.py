@@ -44,7 +44,23 @@ class Quantization(Quantizer):
 
     @classmethod
     def uncompanded(cls, camera: Camera) -> Quantizer:
-        """Return the camera's ADC, linear or logarithmic, with the readout's curve."""
+        """Return the camera's ADC, linear or logarithmic, with the readout's curve.
+
+        Parameters
+        ----------
+        camera : Camera
+            Camera as its file describes it.
+
+        Returns
+        -------
+        Quantizer
+            The ADC, without companding of its codes.
+
+        Raises
+        ------
+        BadInput
+            Where the circuit has no solution.
+        """
         e = electrical(camera)
         if e.curve is not None and e.reference is None:
             return CurvedQuantization(e.curve, e.offset, e.full_scale / e.analog_gain, e.bits)

@@ -55,6 +55,13 @@ def check(camera: Camera, geometry: Geometry) -> None:
 
     It is refused switched off or not: the plan says of what is left out how much it would do.
 
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+    geometry : Geometry
+        Geometry of the array.
+
     Raises
     ------
     BadInput

@@ -91,7 +91,18 @@ class FieldBlur(AberrationBlur, FieldTransfer):
         return DirectedBlur(self.lens, self.wavefront(place), self.focus)
 
     def wavefront(self, place: float) -> Terms:
-        """Return the wavefront on the half-axis to the right, at a place from 0 to 1."""
+        """Return the wavefront at a place on the half-axis to the right.
+
+        Parameters
+        ----------
+        place : float
+            Place from the center, 0, to the corner, 1.
+
+        Returns
+        -------
+        Terms
+            Coefficients by Noll index [m], interpolated linearly between the places of the file.
+        """
         every = sorted({index for _, terms in self.places for index, _ in terms})
         where = [p for p, _ in self.places]
         listed = [dict(terms) for _, terms in self.places]

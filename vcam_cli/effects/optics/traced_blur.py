@@ -326,7 +326,23 @@ class TracedBlur(AberrationBlur, FieldTransfer):
         return self._kept[count]
 
     def at_heights(self, heights: Array) -> tuple[PlaceBlur, ...]:
-        """Return the blur at distances from the axis (F,) [m]. Raises BadInput without an image."""
+        """Return the blur at image heights.
+
+        Parameters
+        ----------
+        heights : Array
+            Distances from the axis (F,) [m].
+
+        Returns
+        -------
+        tuple of PlaceBlur
+            Blur at each of the F heights.
+
+        Raises
+        ------
+        BadInput
+            Where the lens forms no image.
+        """
         found = wavefronts(self.view, tuple(heights.tolist()), self.shortest, self.longest)
         color = lateral_color(self.view, self.half_diagonal, self.shortest, self.longest)
         return tuple(

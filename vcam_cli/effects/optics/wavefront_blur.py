@@ -49,29 +49,86 @@ class Lens:
 
     @classmethod
     def from_camera(cls, camera: Camera, geometry: Geometry) -> Lens:
-        """Return the lens of a camera, which diffracts unless its file switches that off."""
+        """Return the lens of a camera, which diffracts unless its file switches that off.
+
+        Parameters
+        ----------
+        camera : Camera
+            Camera as its file describes it.
+        geometry : Geometry
+            Geometry of the array.
+
+        Returns
+        -------
+        Lens
+            F-number, and whether the lens diffracts.
+        """
         diffracts = camera.optics.diffraction and not switched_off(camera, "diffraction")
         return cls(geometry.working_f_number, diffracts)
 
     def cutoff(self, wavelength: float) -> float:
-        """Return the frequency from which the transfer of an aberration is zero [cycles/m]."""
+        """Return the frequency from which the transfer of an aberration is zero.
+
+        Parameters
+        ----------
+        wavelength : float
+            Wavelength [m].
+
+        Returns
+        -------
+        float
+            Frequency [cycles/m]; inf without diffraction.
+        """
         if not self.diffracts:
             return math.inf
         return float(diffraction.cutoff_frequency(wavelength, self.working_f_number))
 
     def reach(self, terms: Terms) -> float:
-        """Return how far from the ideal image point almost all light of a wavefront lies [m]."""
+        """Return the distance from the ideal image point within which almost all light lies.
+
+        Parameters
+        ----------
+        terms : Terms
+            Coefficients of the wavefront by Noll index [m].
+
+        Returns
+        -------
+        float
+            Distance on the sensor [m].
+        """
         _, tilt = zernike.split_tilt(terms)
         moved = 2 * self.working_f_number * math.hypot(*tilt)
         airy = 2 * GREEN * self.working_f_number if self.diffracts else 0.0
         return moved + ray_blur.blur_radius(terms, self.working_f_number) + airy
 
     def farthest_ray(self, terms: Terms) -> float:
-        """Return how far from the ideal image point a ray meets the sensor, at most [m]."""
+        """Return a bound on the distance between a ray on the sensor and the ideal image point.
+
+        Parameters
+        ----------
+        terms : Terms
+            Coefficients of the wavefront by Noll index [m].
+
+        Returns
+        -------
+        float
+            Distance on the sensor [m].
+        """
         return 2 * self.working_f_number * SURE_OF_SLOPE * zernike.max_slope(terms)
 
     def describe(self, terms: Terms) -> str:
-        """Return a clause with the numbers of a wavefront."""
+        """Return a clause with the numbers of a wavefront.
+
+        Parameters
+        ----------
+        terms : Terms
+            Coefficients of the wavefront by Noll index [m].
+
+        Returns
+        -------
+        str
+            Clause: error in waves, and Strehl ratio or width of the blur.
+        """
         rest, tilt = zernike.split_tilt(terms)
         waves = zernike.rms(rest) / GREEN
         if not zernike.combine(terms):
@@ -89,7 +146,18 @@ class Lens:
 def wavefronts(camera: Camera, geometry: Geometry) -> tuple[tuple[float | None, Terms], ...]:
     """Return the wavefronts that a camera's file gives, defocus included.
 
-    They are ((place, terms), ...) by rising place, which is None for the whole field.
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+    geometry : Geometry
+        Geometry of the array.
+
+    Returns
+    -------
+    tuple of tuple
+        Pairs (place, coefficients [m]) by rising place from 0, the center, to 1, the corner; the
+        place is None for a wavefront of the whole field.
     """
     moved = camera.optics.defocus + geometry.focus_shift
     shift = zernike.defocus(moved, geometry.working_f_number)
@@ -101,19 +169,55 @@ def wavefronts(camera: Camera, geometry: Geometry) -> tuple[tuple[float | None, 
 
 
 def focus_table(camera: Camera) -> WavelengthTable | None:
-    """Return the shift of the image plane by wavelength; None where it is the same at all."""
+    """Return the shift of the image plane by wavelength.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Returns
+    -------
+    WavelengthTable or None
+        Shift [m] over wavelength; None where it is 0 at all wavelengths.
+    """
     table = camera.optics.focus_shift
     return table if table is not None and any(shift for _, shift in table.points) else None
 
 
 def describe_focus(table: WavelengthTable) -> str:
-    """Return a clause with the numbers of a shift by wavelength."""
+    """Return a clause with the numbers of a shift by wavelength.
+
+    Parameters
+    ----------
+    table : WavelengthTable
+        Shift of the image plane [m] over wavelength.
+
+    Returns
+    -------
+    str
+        Clause with the lowest and the highest shift.
+    """
     shifts = [1e6 * shift for _, shift in table.points]
     return f"focus shifts by {min(shifts):.3g} to {max(shifts):.3g} um over the wavelengths"
 
 
 def uniform_wavefront(camera: Camera, geometry: Geometry) -> Terms | None:
-    """Return the wavefront that is the same everywhere, or None where it changes or turns."""
+    """Return the wavefront that is the same everywhere.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+    geometry : Geometry
+        Geometry of the array.
+
+    Returns
+    -------
+    Terms or None
+        Coefficients by Noll index [m]; None where the wavefront changes over the field or turns
+        with the azimuth.
+    """
     (place, terms), *others = wavefronts(camera, geometry)
     same = all(other == terms for _, other in others)
     return terms if same and (place is None or zernike.is_symmetric(terms)) else None
@@ -129,7 +233,18 @@ class UniformBlur(AberrationBlur):
     """Shift of the image plane by wavelength [m]; None of one that is the same at all."""
 
     def at(self, wavelength: float) -> Self:
-        """Return what it is at a wavelength [m], where its focus shifts."""
+        """Return the blur at one wavelength, where its focus shifts.
+
+        Parameters
+        ----------
+        wavelength : float
+            Wavelength [m].
+
+        Returns
+        -------
+        Self
+            The blur with this wavelength's defocus in its terms.
+        """
         assert self.focus is not None
         return self._shifted(float(self.focus.at(wavelength)))
 
@@ -156,7 +271,18 @@ class UniformBlur(AberrationBlur):
         return max(self.lens.reach(blur.terms) for blur in self.extremes)
 
     def cutoff(self, wavelength: float) -> float:
-        """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
+        """Return the frequency from which the transfer is zero.
+
+        Parameters
+        ----------
+        wavelength : float
+            Wavelength [m].
+
+        Returns
+        -------
+        float
+            Frequency [cycles/m]; inf without diffraction.
+        """
         return self.lens.cutoff(wavelength)
 
     def spread(self, wavelengths: Array) -> Array:
@@ -317,10 +443,22 @@ def _highest(lens: Lens, terms: Terms) -> float:
 
 
 def largest_loss(blur: PlaneTransfer, highest: float) -> float:
-    """Return the largest |1 - H| at frequencies up to `highest`, every 32nd part of it.
+    """Return the largest |1 - H| in green light, at every 32nd part of the highest frequency.
 
-    The light is green. Shorter waves lose up to twice as much, but a signal's rms about its mean
-    is at most half of full signal.
+    Shorter waves lose up to twice as much, but a signal's rms about its mean is at most half of
+    full signal.
+
+    Parameters
+    ----------
+    blur : PlaneTransfer
+        Blur of the lens.
+    highest : float
+        Highest frequency along either axis [cycles/m].
+
+    Returns
+    -------
+    float
+        Loss without unit.
     """
     f = np.linspace(-highest, highest, 65)
     return float(np.abs(1 - blur.otf_plane(f, f[32:], GREEN)).max())

@@ -100,7 +100,18 @@ class PixelVignetting(Gain):
         return f"blocks {center} of the light in the center, {corners} in the corners"
 
     def exact_gain(self, x: Array, y: Array) -> Array:
-        """Return the gain at x, y (rows, columns) [m], integrated over the whole pupil."""
+        """Return the gain, integrated over the whole pupil.
+
+        Parameters
+        ----------
+        x, y : Array
+            Positions of pixels (rows, columns) [m].
+
+        Returns
+        -------
+        Array
+            Gain (rows, columns) without unit.
+        """
         share = vignetting.collected_fraction(
             x / self.pupil_distance,
             y / self.pupil_distance,
