@@ -39,7 +39,18 @@ def half_path(path: OpticalPath, radius: float, half: int) -> OpticalPath:
 
 
 def sites(masked: Masked) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
-    """Return the pixels of an array that see the left half of the lens, and the right."""
+    """Return the pixels of an array that see the left half of the lens, and the right.
+
+    Parameters
+    ----------
+    masked : Masked
+        Pattern of the masked pixels.
+
+    Returns
+    -------
+    tuple of tuple of slice
+        Slices (rows, columns) of those pixels, of the left half and of the right.
+    """
     (down, along), (row, column) = masked.period, masked.offset
     rows = slice(row, None, down)
     left, right = (slice(column + i * along, None, 2 * along) for i in (0, 1))
@@ -47,7 +58,22 @@ def sites(masked: Masked) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
 
 
 def masked(rate: Array, halves: tuple[Array, Array], pixels: Masked) -> Array:
-    """Return rates (rows, columns) [e/s] in which single pixels have those of one of its halves."""
+    """Return rates in which masked pixels have those of one of their halves.
+
+    Parameters
+    ----------
+    rate : Array
+        Rates (rows, columns) of whole pixels [e/s].
+    halves : tuple of Array
+        Rates (rows, columns) of the left and of the right half [e/s].
+    pixels : Masked
+        Pattern of the masked pixels.
+
+    Returns
+    -------
+    Array
+        Rates (rows, columns) [e/s].
+    """
     out = rate.copy()
     for at, half in zip(sites(pixels), halves, strict=True):
         out[at] = half[at]
@@ -55,9 +81,23 @@ def masked(rate: Array, halves: tuple[Array, Array], pixels: Masked) -> Array:
 
 
 def unmasked(dn: Array, pixels: Masked, period: int) -> Array:
-    """Return codes (rows, columns) with those of masked pixels taken from their neighbors [DN].
+    """Return codes with those of masked pixels taken from their neighbors.
 
-    They are the mean of the nearest of the same color in the row, `period` columns away.
+    They are the mean of the nearest of the same color in the row.
+
+    Parameters
+    ----------
+    dn : Array
+        Codes (rows, columns) [DN].
+    pixels : Masked
+        Pattern of the masked pixels.
+    period : int
+        Columns from a pixel to the nearest of the same color.
+
+    Returns
+    -------
+    Array
+        Codes (rows, columns) in 32 bits [DN].
     """
     out = dn.astype(np.float32)
     columns = np.arange(dn.shape[1])

@@ -35,13 +35,35 @@ class Sharing:
         return np.array([[colors.index(c) for c in row] for row in self.mosaic.block])
 
     def arriving(self, rate: Array) -> Array:
-        """Return the rates (..., rows, columns) that arrive of those that pixels make [e/s]."""
+        """Return the rates that arrive in pixels after crosstalk.
+
+        Parameters
+        ----------
+        rate : Array
+            Rates (..., rows, columns) that pixels generate [e/s].
+
+        Returns
+        -------
+        Array
+            Rates (..., rows, columns) [e/s].
+        """
         for kernels in self.before:
             rate = self._spread(rate, kernels)
         return rate
 
     def coupled(self, charge: Array) -> Array:
-        """Return what the sense nodes show of charges (..., rows, columns) [electrons]."""
+        """Return the charges that sense nodes show after coupling.
+
+        Parameters
+        ----------
+        charge : Array
+            Charges (..., rows, columns) [electrons].
+
+        Returns
+        -------
+        Array
+            Charges (..., rows, columns) [electrons].
+        """
         return charge if self.after is None else self._spread(charge, self.after)
 
     @cached_property

@@ -137,7 +137,27 @@ class Warps:
         return x, y
 
     def map_at(self, wavelength: float, half: tuple[float, float], moved: bool) -> SmoothMap:
-        """Return the map of a rectangle of the sensor, with the motion of the middle or without."""
+        """Return the map of a rectangle of the sensor at a wavelength.
+
+        Parameters
+        ----------
+        wavelength : float
+            Wavelength [m].
+        half : tuple of float
+            Half the width and half the height of the rectangle about the axis [m].
+        moved : bool
+            Whether to include the motion in the middle of the exposure.
+
+        Returns
+        -------
+        SmoothMap
+            Map from places on the sensor to places in the unwarped image [m].
+
+        Raises
+        ------
+        ValueError
+            Where a part of the rectangle sees nothing.
+        """
         kept = self if moved else Warps(self.still)
         found = smooth_map(lambda x, y: kept.places(x, y, wavelength, self.middle), half)
         if found is None:
@@ -280,9 +300,19 @@ def _joined(path: OpticalPath, reports: Sequence[SpectrumReport]) -> SpectrumRep
 
 
 def covered(effects: Sequence[Effect], geometry: Geometry) -> tuple[float, float] | None:
-    """Return width and height of what an array sees through still warps, about its center [m].
+    """Return the size that an array sees through still warps, about its center.
 
-    It is None where there are none: it sees its own size.
+    Parameters
+    ----------
+    effects : sequence of Effect
+        Effects in their order.
+    geometry : Geometry
+        Geometry of the array.
+
+    Returns
+    -------
+    tuple of float or None
+        Width and height [m]; None without a still warp, where it sees its own size.
     """
     still = of_kind(effects, StillWarp)
     if not still:
@@ -448,7 +478,20 @@ class GroupError:
 
     @classmethod
     def of_chart(cls, path: OpticalPath, scene: ChartScene) -> GroupError:
-        """Return that of a chart before the pixels."""
+        """Return the error of a chart's edges in front of the pixels.
+
+        Parameters
+        ----------
+        path : OpticalPath
+            Lens, pixels and settings.
+        scene : ChartScene
+            The chart.
+
+        Returns
+        -------
+        GroupError
+            Error by the distance of a displacement.
+        """
         g, transfer = path.geometry, path.transfer
         level = path.judged_weights.sum(axis=1)
         region = Region((0.0, 0.0), (g.sensor_width, g.sensor_height))
@@ -467,6 +510,17 @@ class GroupError:
         return self.energy * self.passed / np.square(2 * np.pi * self.frequency)
 
     def rms(self, distance: float) -> float:
-        """Return the error of light displaced by no more than a distance [m]: rms [e/s]."""
+        """Return a bound on the error of displaced light.
+
+        Parameters
+        ----------
+        distance : float
+            Largest displacement [m].
+
+        Returns
+        -------
+        float
+            Error, rms [e/s].
+        """
         lost = np.minimum(np.square(2 * np.pi * self.frequency * distance) / 8, 1.0)
         return math.sqrt(2 * float(np.trapezoid(self._edges * np.square(lost), self.frequency)))

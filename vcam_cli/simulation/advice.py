@@ -24,7 +24,18 @@ UNUSED_WELL = 0.1
 
 
 def advice(ready: Prepared) -> Iterator[str]:
-    """Yield notes on infrared light, on dark renders, and on wells that the ADC ends."""
+    """Yield notes on infrared light, on dark renders, and on wells that the ADC ends.
+
+    Parameters
+    ----------
+    ready : Prepared
+        Camera that is ready for its frame.
+
+    Yields
+    ------
+    str
+        Note for the user.
+    """
     yield from _infrared(ready)
     yield from _dark_render(ready)
     yield from _unused_well(ready)

@@ -44,13 +44,35 @@ def bracket_cameras(camera: Camera) -> tuple[Camera, ...]:
 
 
 def longest_of(camera: Camera) -> int:
-    """Return which exposure of a bracket is the longest, from 0."""
+    """Return the index of the longest exposure of a bracket.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Returns
+    -------
+    int
+        Index from 0.
+    """
     bracket = camera.exposure.bracket
     return bracket.index(max(bracket))
 
 
 def bracket_note(exposure: Exposure) -> str:
-    """Return what a plan of a bracket is a plan of."""
+    """Return the note that a bracket is planned by its longest exposure.
+
+    Parameters
+    ----------
+    exposure : Exposure
+        Exposure with a bracket.
+
+    Returns
+    -------
+    str
+        Note for the user.
+    """
     listed = ", ".join(render(time, "time") for time in exposure.bracket)
     longest = render(max(exposure.bracket), "time")
     return (

@@ -32,15 +32,43 @@ SOURCE = ("scene", "source")
 
 
 def load(camera: str | Path, sets: Sequence[str] = ()) -> Camera:
-    """Return what `camera.load.load` does, with all that is wrong told at once. Raises the same."""
+    """Return the camera of a file, as `camera.load.load` does, with all checks that need no light.
+
+    Parameters
+    ----------
+    camera : str or Path
+        File, or name of a camera that ships.
+    sets : sequence of str, optional
+        Changes `KEY=VALUE`, applied in their order.
+
+    Returns
+    -------
+    Camera
+        Camera that passed all checks.
+
+    Raises
+    ------
+    BadInput
+        With all problems of the file at once.
+    """
     return files.load(camera, sets, checks=CHECKS)
 
 
 def check_effects(camera: Camera) -> None:
-    """Refuse `effects` that ask for what the file does not describe.
+    """Refuse effects that are on but not described in the file.
 
-    It does not matter how lens and readout are solved: a good camera's numbers stand in for theirs,
-    so that an error in them hides nothing here. Raises BadInput.
+    The check does not depend on the solution of lens and readout: a good camera's numbers replace
+    theirs, so that an error in them hides nothing here.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Raises
+    ------
+    BadInput
+        For an effect that is on and has no numbers.
     """
     if not isinstance(camera.effects, dict) or "on" not in camera.effects.values():
         return
@@ -54,7 +82,18 @@ def check_effects(camera: Camera) -> None:
 
 
 def check_size(camera: Camera) -> None:
-    """Refuse an array too small for the demosaicing of its processing (BadInput)."""
+    """Refuse an array too small for the demosaicing of its processing.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Raises
+    ------
+    BadInput
+        For fewer than 2 x 2 pixels, or a missing color among scattered ones.
+    """
     if camera.array.is_scattered:
         _check_every_color(camera)
         return
@@ -78,13 +117,35 @@ def _check_every_color(camera: Camera) -> None:
 
 
 def check_binning(camera: Camera) -> None:
-    """Refuse an array that is no whole number of binning groups (BadInput)."""
+    """Refuse an array that is no whole number of binning groups.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Raises
+    ------
+    BadInput
+        For such an array.
+    """
     if not camera.array.is_scattered:
         camera_layout(camera, geometry(camera))
 
 
 def check_positions(camera: Camera) -> None:
-    """Refuse positions of colors that cannot be processed into a picture (BadInput)."""
+    """Refuse positions of colors that cannot be processed into a picture.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Raises
+    ------
+    BadInput
+        For steps that scattered pixels do not allow, or colors without a display's.
+    """
     if not isinstance(camera.array.pattern, Positions):
         return
     from vcam_cli.processing import check as check_steps
@@ -99,7 +160,18 @@ def check_positions(camera: Camera) -> None:
 
 
 def check_picture(camera: Camera) -> None:
-    """Refuse a picture that is unreadable or contradicts its description (BadInput)."""
+    """Refuse a picture that is unreadable or contradicts its description.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Raises
+    ------
+    BadInput
+        For such a picture, with its file.
+    """
     source, path = camera.scene.source, (*SOURCE, "file")
     if source.kind == "image":
         from vcam_cli.files.images.images import color_channels, picture_size
@@ -120,7 +192,18 @@ def check_picture(camera: Camera) -> None:
 
 
 def check_depth(camera: Camera) -> None:
-    """Refuse a map of depth that does not go with its picture, or with the lens (BadInput)."""
+    """Refuse a depth map that contradicts its picture or the lens.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Raises
+    ------
+    BadInput
+        For such a map.
+    """
     source, path = camera.scene.source, (*SOURCE, "file")
     if not camera.scene.has_depth or not camera.optics.is_lens:
         return
@@ -154,7 +237,18 @@ def _check_crop(crop: Crop, size: tuple[int, int], place: tuple[str | int, ...])
 
 
 def check_spectral_file(camera: Camera) -> None:
-    """Refuse a file of spectra that ends at wavelengths that the camera sees (BadInput)."""
+    """Refuse a file of spectra that ends at wavelengths that the camera sees.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Raises
+    ------
+    BadInput
+        Where more than the tolerance of white's electrons lies beyond its bands.
+    """
     source = camera.scene.source
     if source.kind == "hyperspectral":
         from vcam_cli.files.spectral.hyperspectral import read_bands
@@ -169,12 +263,39 @@ def check_spectral_file(camera: Camera) -> None:
 
 
 def check_lens(camera: Camera) -> None:
-    """Refuse a wavefront too steep, or an unreadable point spread function (BadInput)."""
+    """Refuse a wavefront too steep, or an unreadable point spread function.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Raises
+    ------
+    BadInput
+        For such a lens.
+    """
     read_lens(camera)
 
 
 def read_lens(camera: Camera) -> dict[str, Array]:
-    """Return what the files of the camera's optics hold, for `Camera.with_samples`."""
+    """Return the contents of the optics' files, for `Camera.with_samples`.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Returns
+    -------
+    dict of str to Array
+        Samples by the dotted path of their key; empty without a file.
+
+    Raises
+    ------
+    BadInput
+        For a wavefront too steep, or an unreadable point spread function.
+    """
     aberration.check(camera, geometry(camera))
     for number, alone in enumerate(layer_cameras(camera)):
         from vcam_cli.simulation.scene_files import check_blur
@@ -190,7 +311,18 @@ def read_lens(camera: Camera) -> dict[str, Array]:
 
 
 def check_display(camera: Camera) -> None:
-    """Refuse a display too fine to be judged, where a metric looks at it (BadInput)."""
+    """Refuse a display too fine to be judged, where a metric uses it.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Raises
+    ------
+    BadInput
+        For such a display.
+    """
     if {"cielab", "s-cielab"} & set(camera.quality):
         from vcam_cli.quality.display import display_screen
 
@@ -198,7 +330,18 @@ def check_display(camera: Camera) -> None:
 
 
 def check_files(camera: Camera) -> None:
-    """Refuse files that cannot hold the camera's frame, of those that it asks for (BadInput)."""
+    """Refuse requested files that cannot hold the camera's frame.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Raises
+    ------
+    BadInput
+        For DNG or ISETCam files that cannot.
+    """
     if camera.output.dng:
         from vcam_cli.simulation.output import raw_dng
 
@@ -210,7 +353,18 @@ def check_files(camera: Camera) -> None:
 
 
 def check_irradiance(camera: Camera) -> None:
-    """Refuse point samples of light that consists of lines (BadInput)."""
+    """Refuse point samples of light that consists of lines.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Raises
+    ------
+    BadInput
+        For such light, where the irradiance is sampled at points.
+    """
     if camera.output.irradiance_sampling != "band":
         from vcam_cli.simulation import spectral_irradiance
 
@@ -218,7 +372,18 @@ def check_irradiance(camera: Camera) -> None:
 
 
 def check_radiance(camera: Camera) -> None:
-    """Refuse scenes whose radiance has no single picture (BadInput)."""
+    """Refuse scenes whose radiance has no single picture.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Raises
+    ------
+    BadInput
+        For a scene of several distances, where its radiance is written.
+    """
     if camera.output.radiance:
         from vcam_cli.simulation import scene_radiance
 

@@ -56,12 +56,34 @@ def slowness() -> float:
 
 
 def threads(workers: int) -> float:
-    """Return how much faster so many threads are than one: memory is shared between them."""
+    """Return the speed-up of several threads, which share the memory's bandwidth.
+
+    Parameters
+    ----------
+    workers : int
+        Number of threads.
+
+    Returns
+    -------
+    float
+        Speed relative to one thread.
+    """
     return float(workers**0.75)
 
 
 def output_seconds(camera: Solved) -> float:
-    """Return the core seconds of processing, metrics and files."""
+    """Return the time of processing, metrics and files on one core.
+
+    Parameters
+    ----------
+    camera : Solved
+        Solved camera.
+
+    Returns
+    -------
+    float
+        Time [s].
+    """
     geometry, colors = camera.layout.geometry, len(camera.layout.mosaic.colors)
     pixels = geometry.rows * geometry.columns
     seconds = EXR * pixels * len(camera.output.raw)
@@ -85,7 +107,20 @@ def _places(camera: Solved) -> int:
 
 
 def sample_seconds(camera: Solved, effects: Sequence[Effect]) -> float:
-    """Return the core seconds that several samples take more than a single exposure."""
+    """Return the time on one core that several samples take beyond a single exposure.
+
+    Parameters
+    ----------
+    camera : Solved
+        Solved camera.
+    effects : sequence of Effect
+        Effects that are simulated.
+
+    Returns
+    -------
+    float
+        Time [s]; 0 for a single exposure.
+    """
     count = camera.exposure.count
     if not count:
         return 0.0
@@ -99,9 +134,19 @@ def sample_seconds(camera: Solved, effects: Sequence[Effect]) -> float:
 
 
 def irradiance_seconds(camera: Solved, report: SpectrumReport) -> float:
-    """Return the core seconds of the spectral irradiance, 0 where no file asks for it.
+    """Return the time of the spectral irradiance on one core. Its bands cost what colors do.
 
-    Its bands cost what colors do.
+    Parameters
+    ----------
+    camera : Solved
+        Solved camera.
+    report : SpectrumReport
+        Samples and filters of the light.
+
+    Returns
+    -------
+    float
+        Time [s]; 0 where no file needs it.
     """
     files = bool(camera.output.irradiance) + camera.output.isetcam
     band, geometry = camera.scene.wavelengths, camera.geometry
@@ -111,13 +156,41 @@ def irradiance_seconds(camera: Solved, report: SpectrumReport) -> float:
 
 
 def light_seconds(layout: Layout, report: SpectrumReport, workers: int) -> float:
-    """Return the seconds of image formation alone, on this machine."""
+    """Return the time of image formation alone, on this machine.
+
+    Parameters
+    ----------
+    layout : Layout
+        Pixels and colors.
+    report : SpectrumReport
+        Samples and filters of the light.
+    workers : int
+        Number of threads.
+
+    Returns
+    -------
+    float
+        Time [s].
+    """
     core = image_seconds(layout.lattice, len(layout.mosaic.colors), report)
     return core * slowness() / threads(workers)
 
 
 def first_estimate(camera: Solved, workers: int) -> float:
-    """Return the seconds of a whole run, before anything is known of its scene."""
+    """Return the time of a whole run, before its scene is known.
+
+    Parameters
+    ----------
+    camera : Solved
+        Solved camera.
+    workers : int
+        Number of threads.
+
+    Returns
+    -------
+    float
+        Time on this machine [s].
+    """
     layout = camera.layout
     g = layout.lattice
     samples = 2 * g.rows * g.columns

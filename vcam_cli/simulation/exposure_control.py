@@ -53,7 +53,20 @@ def next_exposure(camera: Solved, last: Prepared) -> ExposureSettings:
 
 
 def set_exposure(camera: Camera, settings: ExposureSettings) -> Camera:
-    """Return the camera with the time and gain that its control has set."""
+    """Return the camera with the exposure that its control has set.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+    settings : ExposureSettings
+        Time and gain of the control.
+
+    Returns
+    -------
+    Camera
+        Camera with a single exposure.
+    """
     return camera.model_copy(
         update={"exposure": camera.exposure.single(settings.time, settings.gain)}
     )

@@ -36,6 +36,16 @@ def figures(frame: Frame) -> list[tuple[str, float, str]]:
 
     `pixel_figures` computes dynamic ranges (eq 3.1), SNR (eq 3.2) and well capacity. Of several
     samples of one integration, all but the last two are of the last sample.
+
+    Parameters
+    ----------
+    frame : Frame
+        Frame that was taken.
+
+    Returns
+    -------
+    list of tuple
+        Metric, value and unit; the unit is empty for numbers without one.
     """
     known = pixel_figures(frame.solved, frame.exposure_time)
     listed = [
@@ -81,7 +91,18 @@ def _sample_figures(
 
 
 def saturated_pixels(frame: Frame) -> Array:
-    """Return which pixels of the raw frame are saturated, in the shape of `dn`."""
+    """Return the mask of saturated pixels of the raw frame.
+
+    Parameters
+    ----------
+    frame : Frame
+        Frame that was taken.
+
+    Returns
+    -------
+    Array
+        Mask in the shape of `dn`.
+    """
     e, groups = frame.electrical, frame.layout.binning_groups
     alone = groups.count == groups.summed_charges and frame.chain.merge is None
     if alone and not frame.chain.noise_of_full:
@@ -91,12 +112,21 @@ def saturated_pixels(frame: Frame) -> Array:
 
 
 def picture_snr_db(frame: Frame) -> float:
-    """Return the mean signal of a picture over its temporal noise [dB].
+    """Return the SNR of a picture: its mean signal over its temporal noise.
 
     Both are of the pixels whose mean signal does not saturate: the mean of their light, and the
-    root of their mean temporal variance, the ADC's rounding included. Of temporal noise variances
-    are straight lines of the signal, so that the mean variance is that of the mean signal. It is
-    -inf without light, or where all pixels saturate.
+    root of their mean temporal variance, the ADC's rounding included. Temporal variances are
+    straight lines of the signal, so that the mean variance is that of the mean signal.
+
+    Parameters
+    ----------
+    frame : Frame
+        Frame that was taken.
+
+    Returns
+    -------
+    float
+        SNR [dB]; -inf without light, or where all pixels saturate.
     """
     groups = frame.layout.binning_groups
     signal = groups.join(frame.rate) * frame.exposure_time / groups.summed_codes
@@ -106,9 +136,19 @@ def picture_snr_db(frame: Frame) -> float:
 
 
 def gray_snr_db(frame: Frame) -> float:
-    """Return the signal of 18 % gray on the axis over its temporal noise, as exposed [dB].
+    """Return the SNR of 18 % gray on the axis, as exposed, over its temporal noise.
 
-    Mean over the pixels, of those colors that do not saturate; else as `picture_snr_db`.
+    The signal is the mean over the pixels of those colors that do not saturate.
+
+    Parameters
+    ----------
+    frame : Frame
+        Frame that was taken.
+
+    Returns
+    -------
+    float
+        SNR [dB]; -inf without light, or where all colors saturate.
     """
     layout, colors = frame.layout, len(frame.mosaic.colors)
     counts = np.ones(colors)
@@ -129,10 +169,20 @@ def _snr_db(frame: Frame, light: float) -> float:
 
 
 def edge_mtf50(frame: Frame) -> float:
-    """Return the MTF50 of the raw frame of a slanted edge [cycles/pixel]: ISO 12233's e-SFR.
+    """Return the MTF50 of the raw frame of a slanted edge: the e-SFR of ISO 12233.
 
-    Of the color with the most pixels, the brightest of these. It is nan where no edge is found, inf
-    where the transfer falls to no half.
+    It is that of the color with the most pixels, the brightest of these.
+
+    Parameters
+    ----------
+    frame : Frame
+        Frame that was taken.
+
+    Returns
+    -------
+    float
+        Frequency [cycles/pixel]; nan where no edge is found, inf where the MTF stays above one
+        half.
     """
     layout, codes = frame.layout, frame.chain.linear(frame.picture_dn)
     if layout.full_color:
@@ -158,10 +208,20 @@ def edge_mtf50(frame: Frame) -> float:
 
 
 def digital_gain(frame: Frame) -> float:
-    """Return what the render multiplies the raw by; 0 where white gives no signal.
+    """Return the factor between the raw frame and the render.
 
-    The raw is 1 where it saturates, the render at its white. A gain of 1 needs no more than that
-    saturation is shown as white, as `tone: {white: sensor}` does.
+    The raw is 1 where it saturates, the render at its white. A gain of 1 shows that saturation as
+    white, as `tone: {white: sensor}` does.
+
+    Parameters
+    ----------
+    frame : Frame
+        Frame that was taken.
+
+    Returns
+    -------
+    float
+        Factor without unit; 0 where white gives no signal.
     """
     tone = next((s.value for s in frame.solved.processing if s.name == "tone"), None)
     stops = 2.0**tone.exposure if tone else 1.0
@@ -197,7 +257,18 @@ class ExposureReport:
 
 
 def exposure_report(frame: Frame) -> ExposureReport:
-    """Return how a frame was exposed; of several samples of one integration the last."""
+    """Return the exposure of a frame.
+
+    Parameters
+    ----------
+    frame : Frame
+        Frame that was taken.
+
+    Returns
+    -------
+    ExposureReport
+        Exposure; of several samples of one integration that of the last.
+    """
     gain = frame.solved.gain
     return ExposureReport(
         time=frame.exposure_time,

@@ -51,7 +51,18 @@ class Frame(Prepared):
     """(rows, columns) what the samples tell of the light [e/s]; None of a single exposure."""
 
     def sample(self, number: int) -> Frame:
-        """Return one of the samples, from 0, as a frame of its own."""
+        """Return one of the samples as a frame of its own.
+
+        Parameters
+        ----------
+        number : int
+            Index of the sample, from 0.
+
+        Returns
+        -------
+        Frame
+            Frame without samples.
+        """
         assert self.samples_electrons is not None and self.samples_dn is not None
         return replace(
             self,
@@ -127,10 +138,21 @@ class Frame(Prepared):
     def axis_rate(
         self, spectra: Sequence[Spectrum], band: tuple[float, float] | None = None
     ) -> Array:
-        """Return electrons per second (C, K) of K radiances on the axis, as they are read out.
+        """Return the rates of radiances on the axis, as pixels are read out.
 
-        Electrons of pixels whose codes are added are, too. `band` has the shortest and the longest
-        wavelength [m] in place of the camera's own.
+        Electrons of pixels whose codes are added are added, too.
+
+        Parameters
+        ----------
+        spectra : sequence of Spectrum
+            Spectral radiances (K of them).
+        band : tuple of float or None, optional
+            Shortest and longest wavelength [m], by default the camera's own.
+
+        Returns
+        -------
+        Array
+            Rates (C, K) [e/s].
         """
         response = self.solved.response
         if band is not None:
@@ -225,7 +247,22 @@ def _phase_codes(
 
 
 def take_frame(ready: Prepared, workers: int, stages: Stages | None = None) -> Frame:
-    """Return one frame of a camera that is ready for it."""
+    """Return one frame of a camera that is ready for it.
+
+    Parameters
+    ----------
+    ready : Prepared
+        Camera that is ready for its frame.
+    workers : int
+        Number of threads; the result does not depend on it.
+    stages : Stages or None, optional
+        Stopwatch of the run's stages.
+
+    Returns
+    -------
+    Frame
+        Frame with electrons and codes.
+    """
     stages, solved = stages or Stages(), ready.solved
     with stages("capture"):
         active, adc = ready.plan.active, ready.chain.adc

@@ -19,11 +19,24 @@ def frame_dataset(result: Photograph) -> Any:
 
     Variables are `dn`, `electrons`, `mean_electrons`, `volts` where the camera knows them, `color`,
     and of several samples `samples_dn`, `samples_electrons` (over `time` [s]) and `photocurrent`;
-    `render` where processing can show the pixels of the raw frame. Dimensions are `y` and `x`
-    [m], `pixel` where pixels lie in no rows and columns, `plane` of stacked pixels, `channel`
-    of the render. Metrics, seeds and exposure are attributes.
+    `render` where processing can show the pixels of the raw frame. Dimensions are `y` and `x` [m],
+    `pixel` where pixels lie in no rows and columns, `plane` of stacked pixels, `channel` of the
+    render. Metrics, seeds and exposure are attributes.
 
-    Raises CannotDo where xarray is not installed.
+    Parameters
+    ----------
+    result : Photograph
+        Photograph with its frame.
+
+    Returns
+    -------
+    Any
+        The `xarray.Dataset`.
+
+    Raises
+    ------
+    CannotDo
+        Where xarray is not installed.
     """
     xarray = optional_library("xarray", NEEDS, "xarray")
     dims = _dimensions(result)

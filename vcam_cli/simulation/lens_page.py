@@ -62,7 +62,17 @@ class LensPage:
 
 
 def lens_page(solved: Solved) -> LensPage:
-    """Return what the lens of a solved camera does.
+    """Return the figures of a solved camera's lens.
+
+    Parameters
+    ----------
+    solved : Solved
+        Solved camera.
+
+    Returns
+    -------
+    LensPage
+        Illumination, distortion, spots, lateral color and MTF by image height.
 
     Raises
     ------
@@ -136,7 +146,18 @@ def _facts(view: View, f_number: float, corner: float, angle: float) -> tuple[st
 
 
 def columns(page: LensPage) -> tuple[str, ...]:
-    """Return the names of the columns of `lens.csv`."""
+    """Return the names of the columns of `lens.csv`.
+
+    Parameters
+    ----------
+    page : LensPage
+        Figures of the lens.
+
+    Returns
+    -------
+    tuple of str
+        Names with units.
+    """
     mtf = [
         f"mtf_{way}_{f / 1e3:.4g}_lp_mm"
         for f in page.frequencies
@@ -155,7 +176,18 @@ def columns(page: LensPage) -> tuple[str, ...]:
 
 
 def rows(page: LensPage) -> Iterator[tuple[float, ...]]:
-    """Yield the rows of `lens.csv`, from the center to the corner."""
+    """Yield the rows of `lens.csv`, from the center to the corner.
+
+    Parameters
+    ----------
+    page : LensPage
+        Figures of the lens.
+
+    Yields
+    ------
+    tuple of float
+        Values in the order of `columns`.
+    """
     for i in range(len(page.heights)):
         mtf = [m[i] for pair in zip(page.tangential, page.sagittal, strict=True) for m in pair]
         yield (

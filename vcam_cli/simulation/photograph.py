@@ -249,5 +249,16 @@ class Photograph:
 
 
 def needs_picture(camera: Solved) -> bool:
-    """Return whether a camera's file asks for more than the raw frame."""
+    """Return whether a camera's file requests more than the raw frame.
+
+    Parameters
+    ----------
+    camera : Solved
+        Solved camera.
+
+    Returns
+    -------
+    bool
+        True for a render, or metrics of it.
+    """
     return camera.output.render is not None or bool(camera.quality)

@@ -43,7 +43,20 @@ class PixelFigures:
 
 
 def pixel_figures(solved: Solved, time: float) -> PixelFigures:
-    """Return signal over noise of a pixel that is exposed for a time [s]."""
+    """Return the SNR and dynamic range of a pixel.
+
+    Parameters
+    ----------
+    solved : Solved
+        Solved camera.
+    time : float
+        Exposure time [s].
+
+    Returns
+    -------
+    PixelFigures
+        SNR and dynamic range [dB], and charges [electrons].
+    """
     chain, groups = solved.chain, solved.layout.binning_groups
     # In electrons of all wells together, in which shot noise is Poisson's.
     wells = groups.count // groups.summed_charges

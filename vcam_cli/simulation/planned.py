@@ -59,6 +59,28 @@ class PlannedRun:
 
 
 def planned_run(camera: Camera, workers: int | None, watch: Observer) -> PlannedRun:
-    """Return the plan of a camera's frame. Raises BadInput, CannotDo."""
+    """Return the plan of a camera's frame.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+    workers : int or None
+        Number of threads; None for a number that suits the array.
+    watch : Observer
+        Observer of the stages.
+
+    Returns
+    -------
+    PlannedRun
+        Plan and notes.
+
+    Raises
+    ------
+    BadInput
+        For a camera that contradicts itself.
+    CannotDo
+        Where memory does not suffice.
+    """
     ready, notes = prepare(camera, workers, watch)
     return PlannedRun(ready, notes, ready.solved.frame_rate)

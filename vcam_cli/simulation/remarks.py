@@ -77,7 +77,18 @@ class Notes(Sequence[str]):
 
 
 def remarks(ready: Prepared) -> tuple[str, ...]:
-    """Return notes on the silicon, on times that the camera chose, and on a scene of spectra."""
+    """Return notes on the silicon, on times that the camera chose, and on a scene of spectra.
+
+    Parameters
+    ----------
+    ready : Prepared
+        Camera that is ready for its frame.
+
+    Returns
+    -------
+    tuple of str
+        Notes for the user.
+    """
     scene, band = _picture(ready), ready.solved.scene.wavelengths
     before = (
         *ready.solved.notes,

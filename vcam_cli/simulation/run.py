@@ -22,9 +22,31 @@ class Run:
     """Estimated time of what came before, such as the autofocus; the plan counts it [s]."""
 
     def unseen(self, rate_cache: RateCache | None = None) -> Run:
-        """Return the same computation without an observer, for trials."""
+        """Return the same computation without an observer, for trials.
+
+        Parameters
+        ----------
+        rate_cache : RateCache or None, optional
+            Light of cameras before.
+
+        Returns
+        -------
+        Run
+            Run with the same number of threads.
+        """
         return Run(self.workers, Stages(), rate_cache)
 
     def after(self, seconds: float) -> Run:
-        """Return the same computation behind further work of so many seconds."""
+        """Return the same computation behind further work.
+
+        Parameters
+        ----------
+        seconds : float
+            Time of that work [s].
+
+        Returns
+        -------
+        Run
+            Run that counts it as earlier.
+        """
         return replace(self, earlier=self.earlier + seconds)

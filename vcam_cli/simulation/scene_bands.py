@@ -24,10 +24,22 @@ if TYPE_CHECKING:  # checks of a file need no more than its bands
 
 
 def completed(solved: Solved, cube: Cube) -> tuple[Cube, tuple[str, ...]]:
-    """Return a file of spectra, dark beyond its bands where the camera hardly sees, and a note.
+    """Return a file of spectra, dark beyond its bands where the camera hardly sees.
 
     A file that covers the wavelengths simulated comes back as it is, and so does one that ends
     where the camera sees.
+
+    Parameters
+    ----------
+    solved : Solved
+        Solved camera.
+    cube : Cube
+        Spectra of the file.
+
+    Returns
+    -------
+    tuple
+        Spectra, and a note where they are taken as dark.
     """
     if covers(solved.scene, cube.bands):
         return cube, ()
@@ -46,6 +58,20 @@ def unseen_share(scene: Scene, responses: Sequence[Spectrum], bands: Bands) -> f
     """Return the largest share of white's electrons that light beyond a file's bands makes.
 
     White goes on beyond the bands: in the scene's lamp, or even light where the file holds light.
+
+    Parameters
+    ----------
+    scene : Scene
+        Lamp and wavelengths of the scene.
+    responses : sequence of Spectrum
+        Electrons per photon of each color.
+    bands : Bands
+        Bands of the file.
+
+    Returns
+    -------
+    float
+        Share without unit, of the color with the largest.
     """
     start, stop = scene.wavelengths.start, scene.wavelengths.stop
     light = Spectrum.flat(1.0)

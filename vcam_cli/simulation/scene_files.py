@@ -43,9 +43,24 @@ SOURCE = ("scene", "source")
 
 
 def read_scene(camera: Camera, stages: Stages) -> tuple[Any, tuple[str, ...]]:
-    """Return what the scene's files hold (`ScenePicture`), and notes.
+    """Return the contents of the scene's files.
 
-    Raises BadInput for files that cannot be used.
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+    stages : Stages
+        Stopwatch of the run's stages.
+
+    Returns
+    -------
+    tuple
+        Contents (`ScenePicture`), and notes.
+
+    Raises
+    ------
+    BadInput
+        For files that cannot be used.
     """
     source, path = camera.scene.source, (*SOURCE, "file")
     if source.kind == "image":
@@ -80,9 +95,24 @@ def _with_depth(
 
 
 def read_map(camera: Camera, size: tuple[int, int]) -> tuple[Array, tuple[str, ...]]:
-    """Return the map of depth (h, w) [m] beside a scene's file of so many samples, and notes.
+    """Return the depth map beside a scene's file.
 
-    Raises BadInput for a map that does not go with it, or with what the lens cannot image.
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+    size : tuple of int
+        Height and width of the file [samples].
+
+    Returns
+    -------
+    tuple
+        Depth (h, w) [m], and notes.
+
+    Raises
+    ------
+    BadInput
+        For a map that contradicts the file, or depths that the lens cannot image.
     """
     from vcam_cli.files.images.scene_maps import read_depth
 
@@ -108,9 +138,19 @@ def read_map(camera: Camera, size: tuple[int, int]) -> tuple[Array, tuple[str, .
 
 
 def check_blur(alone: Camera, path: tuple[str | int, ...]) -> None:
-    """Refuse a distance at which a camera's blur cannot be followed (BadInput).
+    """Refuse a distance at which a camera's blur cannot be computed.
 
-    `alone` looks at that distance only, `path` is the key that tells it.
+    Parameters
+    ----------
+    alone : Camera
+        Camera that looks at this distance only.
+    path : tuple of str or int
+        Key of the distance.
+
+    Raises
+    ------
+    BadInput
+        For such a distance.
     """
     try:
         aberration.check(alone, geometry(alone))
@@ -127,9 +167,21 @@ def check_blur(alone: Camera, path: tuple[str | int, ...]) -> None:
 
 
 def flattened(solved: Solved, picture: ScenePicture) -> tuple[Solved, Any, tuple[str, ...]]:
-    """Return the camera without a map of depth that is one distance within the tolerance, and why.
+    """Return the camera without a depth map that is one distance within the tolerance.
 
-    Then the scene is flat, at that distance. An autofocus may yet tell distances apart.
+    Then the scene is flat, at that distance. With autofocus the tolerance is 0.
+
+    Parameters
+    ----------
+    solved : Solved
+        Solved camera.
+    picture : ScenePicture
+        Contents of the scene's files.
+
+    Returns
+    -------
+    tuple
+        Camera, contents without the map, and a note where the map is flat.
     """
     if not isinstance(picture, DepthPicture):
         return solved, picture, ()
@@ -193,7 +245,18 @@ def _read_layers(source: Layers) -> tuple[tuple[LayerFiles, ...], tuple[str, ...
 
 
 def scene_bytes(picture: ScenePicture) -> int:
-    """Return the memory of what was read [bytes]."""
+    """Return the memory of a scene's files.
+
+    Parameters
+    ----------
+    picture : ScenePicture
+        Contents of the scene's files.
+
+    Returns
+    -------
+    int
+        Memory [bytes].
+    """
     if isinstance(picture, tuple):
         return sum(files.nbytes for files in picture)
     return getattr(picture, "nbytes", 0)
@@ -202,9 +265,28 @@ def scene_bytes(picture: ScenePicture) -> int:
 def build_scene(
     solved: Solved, view: View, picture: ScenePicture, overexposure: float = 1.0
 ) -> AnyScene:
-    """Return the scene of a camera on a view, from what its files hold; raises as `build` does.
+    """Return the scene of a camera on a view.
 
-    `overexposure` is white over what fills a pixel; below 1 it counts as 1.
+    Parameters
+    ----------
+    solved : Solved
+        Solved camera.
+    view : View
+        Grid of samples on the sensor.
+    picture : ScenePicture
+        Contents of the scene's files.
+    overexposure : float, optional
+        White over the signal that fills a pixel; below 1 it counts as 1.
+
+    Returns
+    -------
+    AnyScene
+        Scene; raises as `build` does.
+
+    Raises
+    ------
+    ValueError
+        Where the contents do not match the source.
     """
     source = solved.scene.source
     if isinstance(picture, DepthPicture):
@@ -229,7 +311,22 @@ def build_scene(
 def layer_optics(
     solved: Solved, effects: tuple[Effect, ...], scene: AnyScene
 ) -> tuple[LayerOptics, ...]:
-    """Return what acts on the light of each layer; () of a scene that is seen flat."""
+    """Return the effects on the light of each layer.
+
+    Parameters
+    ----------
+    solved : Solved
+        Solved camera.
+    effects : tuple of Effect
+        Effects in their order.
+    scene : AnyScene
+        Scene with its layers.
+
+    Returns
+    -------
+    tuple of LayerOptics
+        Effects and defocus of each layer; () of a scene that is seen flat.
+    """
     if not of_kind(effects, Depth):
         return ()
     layers = solved.layers

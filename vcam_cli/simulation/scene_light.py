@@ -143,9 +143,23 @@ def formed_light(seen: SceneLight, run: Run) -> photon_rate.Rate:
 
 
 def light_during(seen: SceneLight, light: photon_rate.Rate, start: float, stop: float) -> Array:
-    """Return the light from `start` to `stop` after a line's exposure begins [s], as `light` is.
+    """Return the light during a part of the exposure.
 
     It is that of the whole exposure where nothing is simulated to move.
+
+    Parameters
+    ----------
+    seen : SceneLight
+        Scene and its light path.
+    light : photon_rate.Rate
+        Light of the whole exposure.
+    start, stop : float
+        Times after a line's exposure begins [s].
+
+    Returns
+    -------
+    Array
+        Rates in the shape of `light.values` [e/s].
     """
     whole = light.plan.reduced(seen.path)
     if not of_kind(whole.effects, ImageMotion) and not any(
@@ -161,7 +175,18 @@ def light_during(seen: SceneLight, light: photon_rate.Rate, start: float, stop: 
 
 
 def refuse_too_much(electrons: float) -> None:
-    """Refuse light that no unit could have meant (BadInput)."""
+    """Refuse light far beyond any camera's.
+
+    Parameters
+    ----------
+    electrons : float
+        Electrons in a pixel or a second.
+
+    Raises
+    ------
+    BadInput
+        For more than `MOST_ELECTRONS`, or NaN.
+    """
     if not electrons < MOST_ELECTRONS:
         raise bad(
             "scene",

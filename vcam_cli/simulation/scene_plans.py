@@ -130,12 +130,34 @@ def plan_scenes(
 
 
 def columns(plans: Sequence[ScenePlan]) -> tuple[str, ...]:
-    """Return the columns of scenes.csv, with those of measured seconds where there are some."""
+    """Return the columns of scenes.csv, with those of measured times where there are some.
+
+    Parameters
+    ----------
+    plans : sequence of ScenePlan
+        Plans of scenes.
+
+    Returns
+    -------
+    tuple of str
+        Names of the columns.
+    """
     return COLUMNS + MEASURED if any(each.times for each in plans) else COLUMNS
 
 
 def rows(plans: Sequence[ScenePlan]) -> Iterator[tuple[str | float, ...]]:
-    """Return the rows of scenes.csv: one effect before one scene each, by `columns`."""
+    """Yield the rows of scenes.csv: one effect before one scene each.
+
+    Parameters
+    ----------
+    plans : sequence of ScenePlan
+        Plans of scenes.
+
+    Yields
+    ------
+    tuple of str or float
+        Values in the order of `columns`.
+    """
     for each in plans:
         taken = each.seconds if each.times else ()
         for d in each.decisions:
@@ -145,15 +167,34 @@ def rows(plans: Sequence[ScenePlan]) -> Iterator[tuple[str | float, ...]]:
 
 
 def seconds_text(seconds: float) -> str:
-    """Return seconds to two digits, without a power of ten [s]."""
+    """Return a time to two digits, without a power of ten.
+
+    Parameters
+    ----------
+    seconds : float
+        Time [s].
+
+    Returns
+    -------
+    str
+        Text.
+    """
     return f"{seconds:.2g}" if seconds < 9.95 else f"{seconds:.0f}"
 
 
 def mark(decision: Decision) -> str:
-    """Return what tables show of an effect before a scene.
+    """Return the cell of a table for an effect before a scene.
 
-    "on" if it is simulated, "free" if it is simulated because skipping it would save nothing, "off"
-    if the file switches it off; if the plan skips it, the milliseconds that this saves, or nothing.
+    Parameters
+    ----------
+    decision : Decision
+        Decision of the plan on the effect.
+
+    Returns
+    -------
+    str
+        "on" if it is simulated, "free" if it is simulated because skipping it would save nothing,
+        "off" if the file switches it off; if the plan skips it, the milliseconds saved, or nothing.
     """
     if decision.state == "on":
         return "free" if decision.free else "on"
@@ -163,6 +204,17 @@ def mark(decision: Decision) -> str:
 
 
 def effect_names(plans: Sequence[ScenePlan]) -> list[str]:
-    """Return the names of the effects that occur, in the order of action."""
+    """Return the names of the effects that occur, in the order of action.
+
+    Parameters
+    ----------
+    plans : sequence of ScenePlan
+        Plans of scenes.
+
+    Returns
+    -------
+    list of str
+        Names.
+    """
     present = {d.name for each in plans for d in each.decisions}
     return [kind.name for kind in ORDER if kind.name in present]

@@ -39,21 +39,59 @@ of the shipped pictures to 4e-7 of the brightest pixel (5 nm: 4e-6)."""
 
 
 def check(camera: Camera) -> None:
-    """Raise BadInput for a scene that has no one picture of radiances."""
+    """Check that a scene has one picture of radiances, where it is written.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Raises
+    ------
+    BadInput
+        For a scene of several distances.
+    """
     if camera.output.radiance and camera.scene.has_distances:
         message = "a scene of several distances is not one picture of radiances"
         raise bad(PATH, message, "write radiance: false")
 
 
 def nodes(ready: Prepared) -> Array:
-    """Return the wavelengths at which it is given, (J,) rising [m]."""
+    """Return the wavelengths at which the radiance is given.
+
+    Parameters
+    ----------
+    ready : Prepared
+        Camera that is ready for its frame.
+
+    Returns
+    -------
+    Array
+        Wavelengths (J,), rising [m].
+    """
     band = ready.camera.scene.wavelengths
     step = STEP if band.step is None else ready.settings.wavelength_step
     return Band(band.start, band.stop, step).nodes()
 
 
 def sampled_scene(ready: Prepared) -> SampledScene:
-    """Return the scene on the grid that is written; (ny, nx) samples on the sensor's plane."""
+    """Return the scene on the grid that is written.
+
+    Parameters
+    ----------
+    ready : Prepared
+        Camera that is ready for its frame.
+
+    Returns
+    -------
+    SampledScene
+        Scene of (ny, nx) samples on the sensor's plane.
+
+    Raises
+    ------
+    BadInput
+        For a scene of several distances.
+    """
     check(ready.camera)  # a camera changed in Python was not checked as a file is
     scene = ready.scene
     if isinstance(scene, SampledScene) and scene.samples == "squares":
@@ -71,19 +109,60 @@ def sampled_scene(ready: Prepared) -> SampledScene:
 
 
 def planes(ready: Prepared, scene: SampledScene, workers: int) -> Iterator[Array]:
-    """Yield the spectral radiance at each of the `nodes`, one by one: (ny, nx) [W/(sr m2 m)]."""
+    """Yield the spectral radiance at each of the `nodes`, one by one.
+
+    Parameters
+    ----------
+    ready : Prepared
+        Camera that is ready for its frame.
+    scene : SampledScene
+        Scene of `sampled_scene`.
+    workers : int
+        Number of threads; the result does not depend on it.
+
+    Yields
+    ------
+    Array
+        Spectral radiance (ny, nx) [W/(sr m2 m)].
+    """
     for level in band_means(scene.spectra, nodes(ready)).T:
         yield np.maximum(scene.planes(level[np.newaxis], workers)[0], 0)
 
 
 def band_means(spectra: tuple[Spectrum, ...], wavelengths: Array) -> Array:
-    """Return means of spectra over the bands of wavelengths: (K, J) [their unit per m]."""
+    """Return the means of spectra over the bands of wavelengths.
+
+    Parameters
+    ----------
+    spectra : tuple of Spectrum
+        Spectra (K of them).
+    wavelengths : Array
+        Wavelengths (J,), rising [m].
+
+    Returns
+    -------
+    Array
+        Means (K, J) [unit of the spectra per m].
+    """
     bands = np.array([hat_weights(s, wavelengths) for s in spectra])
     return np.asarray(bands / hat_weights(Spectrum.flat(1.0), wavelengths))
 
 
 def read_back(ready: Prepared, scene: SampledScene) -> str:
-    """Return what a camera file says of the file, for the same frame."""
+    """Return the keys of a camera file that reads the written file for the same frame.
+
+    Parameters
+    ----------
+    ready : Prepared
+        Camera that is ready for its frame.
+    scene : SampledScene
+        Scene of `sampled_scene`.
+
+    Returns
+    -------
+    str
+        Keys of the source, as YAML.
+    """
     scale, extent = ready.geometry.scene_scale, "sensor"
     if not _covers_the_array(ready, scene):
         extent = f"{{width: {scene.extent[0] / scale:.12g} m}}"

@@ -38,7 +38,20 @@ class Shared:
     _last: tuple[str, Picture] | None = None
 
     def picture(self, camera: Camera, read: Callable[[], Picture]) -> Picture:
-        """Return what `read` gives, or gave for a camera before with the same file as its scene."""
+        """Return the contents of a scene's files, read once for cameras with the same source.
+
+        Parameters
+        ----------
+        camera : Camera
+            Camera as its file describes it.
+        read : callable
+            Reads them.
+
+        Returns
+        -------
+        Picture
+            Contents and notes.
+        """
         key = camera.scene.source.model_dump_json(exclude={"crop"})
         last = self._last
         if last is not None and last[0] == key:

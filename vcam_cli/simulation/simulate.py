@@ -26,7 +26,27 @@ class Result(Photograph):
     """
 
     def save(self, folder: str | Path) -> Path:
-        """Write what `vcam run` writes, and return the folder. Raises BadInput, CannotDo."""
+        """Write the files of `vcam run`.
+
+        Parameters
+        ----------
+        folder : str or Path
+            Folder to write.
+
+        Returns
+        -------
+        Path
+            The folder.
+
+        Raises
+        ------
+        BadInput
+            For a folder that cannot be written.
+        CannotDo
+            Where memory or a library is missing.
+        TypeError
+            For what is no path.
+        """
         from vcam_cli.simulation.output.outputs import save
 
         return save(self, require_folder(folder))
@@ -39,7 +59,23 @@ class Result(Photograph):
 
 
 def threads(camera: Camera) -> int:
-    """Return the threads for a frame: all processors, fewer for small ones. Raises BadInput."""
+    """Return the threads for a frame: all processors, fewer for small frames.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Returns
+    -------
+    int
+        Number of threads.
+
+    Raises
+    ------
+    BadInput
+        For a camera without a geometry.
+    """
     g = geometry(camera)
     return suitable_workers(g.rows * g.columns)
 
@@ -90,7 +126,29 @@ def simulate(
 def prepare(
     camera: Camera, workers: int | None = None, watch: Observer | Callback | None = None
 ) -> tuple[Prepared, remarks.Notes]:
-    """Return the camera ready to take its frame, and notes: what `vcam plan` shows."""
+    """Return the camera ready to take its frame, and notes, as `vcam plan` shows.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+    workers : int or None, optional
+        Number of threads, by default `threads`; results do not depend on it.
+    watch : Observer or Callback or None, optional
+        Follows the run: see `vcam_cli.progress.observer`.
+
+    Returns
+    -------
+    tuple
+        Camera with its plan and light, and notes.
+
+    Raises
+    ------
+    BadInput
+        For a camera that contradicts itself, with positions in its file.
+    CannotDo
+        Where memory does not suffice.
+    """
     try:
         shared = RECENT.shared_with(camera)
         stages = Stages(watch=observer(watch))

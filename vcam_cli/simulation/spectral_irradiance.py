@@ -53,7 +53,18 @@ DARK = 1e-12
 
 
 def check(camera: Camera) -> None:
-    """Raise BadInput for point samples of light that consists of lines."""
+    """Check that light has no lines where the irradiance is sampled at points.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Raises
+    ------
+    BadInput
+        For point samples of light that consists of lines.
+    """
     if camera.output.irradiance_sampling == "band":
         return
     source, light = camera.scene.source, camera.scene.illuminant
@@ -64,15 +75,41 @@ def check(camera: Camera) -> None:
 
 
 def nodes(ready: Prepared) -> Array:
-    """Return the wavelengths at which it is given, (J,) rising [m]."""
+    """Return the wavelengths at which the irradiance is given.
+
+    Parameters
+    ----------
+    ready : Prepared
+        Camera that is ready for its frame.
+
+    Returns
+    -------
+    Array
+        Wavelengths (J,), rising [m].
+    """
     band = ready.solved.scene.wavelengths
     return Band(band.start, band.stop, ready.settings.wavelength_step).nodes()
 
 
 def planes(ready: Prepared, workers: int) -> Iterator[Array]:
-    """Yield the spectral irradiance at each of the `nodes`, one by one: (rows, columns) [W/(m2 m)].
+    """Yield the spectral irradiance at each of the `nodes`, one by one.
 
-    Raises CannotDo where memory does not suffice.
+    Parameters
+    ----------
+    ready : Prepared
+        Camera that is ready for its frame.
+    workers : int
+        Number of threads; the result does not depend on it.
+
+    Yields
+    ------
+    Array
+        Spectral irradiance (rows, columns) [W/(m2 m)].
+
+    Raises
+    ------
+    CannotDo
+        Where memory does not suffice.
     """
     wavelengths = nodes(ready)
     level = levels(ready, wavelengths)
@@ -144,7 +181,20 @@ def _scene(ready: Prepared) -> AnyScene:
 
 
 def levels(ready: Prepared, wavelengths: Array) -> Array:
-    """Return the irradiance of the K components on the axis, without blur: (K, J) [W/(m2 m)]."""
+    """Return the irradiance of the scene's components on the axis, without blur.
+
+    Parameters
+    ----------
+    ready : Prepared
+        Camera that is ready for its frame.
+    wavelengths : Array
+        Wavelengths (J,), rising [m].
+
+    Returns
+    -------
+    Array
+        Irradiance (K, J) of the K components [W/(m2 m)].
+    """
     per_radiance = ready.geometry.irradiance_per_radiance
     transmittance = ready.solved.optics.transmittance.resolve()
     spectra = [s.multiply(transmittance) for s in ready.scene.spectra]
@@ -152,7 +202,22 @@ def levels(ready: Prepared, wavelengths: Array) -> Array:
 
 
 def spectral_levels(output: Output, spectra: Sequence[Spectrum], wavelengths: Array) -> Array:
-    """Return spectra as `output.irradiance` samples them: (K, J) [their unit per m]."""
+    """Return spectra as `output.irradiance` samples them.
+
+    Parameters
+    ----------
+    output : Output
+        Output of the camera's file.
+    spectra : sequence of Spectrum
+        Spectra (K of them).
+    wavelengths : Array
+        Wavelengths (J,), rising [m].
+
+    Returns
+    -------
+    Array
+        Samples (K, J) [unit of the spectra per m].
+    """
     if output.irradiance_sampling == "point":
         return np.array([s.evaluate(wavelengths) for s in spectra])
     bands = np.array([hat_weights(s, wavelengths) for s in spectra])

@@ -24,19 +24,52 @@ EVEN = 1e-5
 
 
 def ray_reach(optics: LayerOptics) -> tuple[float, float]:
-    """Return how far rays meet a layer from where they reach the sensor, along x and y [m]."""
+    """Return how far from their place on the sensor rays meet a layer, at most.
+
+    Parameters
+    ----------
+    optics : LayerOptics
+        What acts on the light of the layer.
+
+    Returns
+    -------
+    tuple of float
+        Distances along x and y, on the plane of the sensor [m].
+    """
     travel = sum((motion.travel for motion in of_kind(optics.effects, ImageMotion)), 0.0)
     return abs(optics.radius) + travel, abs(optics.radius) + travel
 
 
 def even_motion(optics: LayerOptics) -> EvenMotion | None:
-    """Return the motion of a layer along a straight line; None where it is still."""
+    """Return the motion of a layer along a straight line.
+
+    Parameters
+    ----------
+    optics : LayerOptics
+        What acts on the light of the layer.
+
+    Returns
+    -------
+    EvenMotion or None
+        Motion; None where the layer has no such motion.
+    """
     found = of_kind(optics.effects, EvenMotion)
     return found[0] if found else None
 
 
 def moves_otherwise(optics: LayerOptics) -> bool:
-    """Return whether a layer moves along a path that rays do not follow."""
+    """Return whether a layer moves along a path that rays do not follow.
+
+    Parameters
+    ----------
+    optics : LayerOptics
+        What acts on the light of the layer.
+
+    Returns
+    -------
+    bool
+        True where it moves, and not along a straight line.
+    """
     return bool(of_kind(optics.effects, ImageMotion)) and even_motion(optics) is None
 
 

@@ -88,7 +88,18 @@ class SeenLayer:
     """What a cut margin of its chart changes, rms [e/s]."""
 
     def lost_rms(self, g: Geometry) -> float:
-        """Return a bound on what the layer's own image lacks, rms over all of an array [e/s]."""
+        """Return a bound on what the layer's own image lacks, rms over all of an array.
+
+        Parameters
+        ----------
+        g : Geometry
+            Geometry of the array.
+
+        Returns
+        -------
+        float
+            Bound [e/s].
+        """
         rows, columns = self.window.pixels
         area = rows * columns / _share_seen(self.window, self.beyond)
         own = self.report.lost_rms * math.sqrt(area / (g.rows * g.columns))
@@ -219,7 +230,24 @@ def _painted(path: OpticalPath, scene: LayeredScene, cells: Cells) -> list[RayLa
 def gathered(
     layers: Layers, g: Geometry, like: Array, at: tuple[float, float] = (0.0, 0.0)
 ) -> Array:
-    """Return the sum (C, rows, columns) of parts of an image whose center lies at a place [m]."""
+    """Return the sum of parts of an image.
+
+    Parameters
+    ----------
+    layers : Layers
+        Parts of the image, with their weights.
+    g : Geometry
+        Geometry of the array.
+    like : Array
+        Rates (C, ...), which set the number of colors and the float type [e/s].
+    at : tuple of float, optional
+        Position (x, y) of the center of `g` [m].
+
+    Returns
+    -------
+    Array
+        Sum (C, rows, columns) [e/s].
+    """
     out: Array = np.zeros((len(like), g.rows, g.columns), like.dtype)
     columns, rows = pixel_centers(g)
     for layer in layers:
@@ -352,7 +380,18 @@ def _window(g: Geometry, part: LayerPart, beyond: float) -> Window:
 
 
 def is_of_lens(effect: Effect) -> bool:
-    """Return whether an effect blurs or moves light before it is on the sensor."""
+    """Return whether an effect blurs or moves light before it is on the sensor.
+
+    Parameters
+    ----------
+    effect : Effect
+        Effect of a camera.
+
+    Returns
+    -------
+    bool
+        True for image motion, and for blurs of the lens.
+    """
     moves = bool(of_kind([effect], ImageMotion))
     return moves or (effect.origin == "lens" and bool(of_kind([effect], Blur, FieldTransfer)))
 

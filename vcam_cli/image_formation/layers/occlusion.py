@@ -67,14 +67,36 @@ class RayLayer:
     """How far its image is displaced in the middle of the exposure."""
 
     def together(self, count: int) -> RayLayer:
-        """Return the means over so many cells along either side."""
+        """Return the means over squares of cells.
+
+        Parameters
+        ----------
+        count : int
+            Cells along either side of a square.
+
+        Returns
+        -------
+        RayLayer
+            Layer on the squares, its lengths in squares.
+        """
         radius, path, place = (
             (x / count, y / count) for x, y in (self.radius, self.path, self.place)
         )
         return RayLayer(cell_means(self.planes, count), radius, path, place)
 
     def offsets(self, rays: Array) -> Array:
-        """Return by how many cells (n, 2) right and down of its own each ray meets the layer."""
+        """Return the offset of the cell at which each ray meets the layer from the ray's own cell.
+
+        Parameters
+        ----------
+        rays : Array
+            Rays (n, 5) of `rays`.
+
+        Returns
+        -------
+        Array
+            Offsets (n, 2) right and down [cells].
+        """
         u, t, within = rays[:, :2], rays[:, 2:3] - 0.5, rays[:, 3:]
         met = within + u * self.radius - t * self.path - self.place
         return np.floor(met).astype(int)
@@ -107,7 +129,18 @@ def rays(count: int, kind: int) -> Array:
 
 
 def front_to_back(layers: Sequence[Planes]) -> Array:
-    """Return the light (C, h, w) of layers one before the other."""
+    """Return the light of layers one before the other.
+
+    Parameters
+    ----------
+    layers : sequence of Planes
+        Light times opacity (C, h, w), and opacity (h, w) or (C, h, w), the nearest first.
+
+    Returns
+    -------
+    Array
+        Light (C, h, w), in the unit of the layers' light.
+    """
     light, opacity = layers[0]
     total = light.copy()
     clear = 1 - opacity

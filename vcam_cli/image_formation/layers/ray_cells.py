@@ -36,13 +36,35 @@ class Window:
         return self.rows.stop - self.rows.start, self.columns.stop - self.columns.start
 
     def geometry(self, g: Geometry) -> Geometry:
-        """Return the geometry of its pixels, as if they were all of an array."""
+        """Return the geometry of its pixels, as if the array had no others.
+
+        Parameters
+        ----------
+        g : Geometry
+            Geometry of the array.
+
+        Returns
+        -------
+        Geometry
+            Geometry of the window.
+        """
         rows, columns = self.pixels
         size = columns * g.pitch_x, rows * g.pitch_y
         return replace(g, rows=rows, columns=columns, sensor_width=size[0], sensor_height=size[1])
 
     def center(self, g: Geometry) -> tuple[float, float]:
-        """Return its center, as its pixels see it, right of and below the array's [m]."""
+        """Return its center, as its pixels see it.
+
+        Parameters
+        ----------
+        g : Geometry
+            Geometry of the array.
+
+        Returns
+        -------
+        tuple of float
+            Position right of and below the array's center [m].
+        """
         x = (self.columns.start + self.columns.stop - g.columns) / 2 * g.pitch_x
         y = (self.rows.start + self.rows.stop - g.rows) / 2 * g.pitch_y
         return x * g.sampling_scale, y * g.sampling_scale
@@ -82,7 +104,18 @@ class Cells:
         return middle
 
     def together(self, count: int) -> Cells:
-        """Return cells that are each so many of these along either side."""
+        """Return larger cells.
+
+        Parameters
+        ----------
+        count : int
+            Cells of these along either side of a larger one.
+
+        Returns
+        -------
+        Cells
+            Cells of the same window.
+        """
         down, right = self.reach
         reach, border = (down // count, right // count), self.border // count
         return replace(self, per_pixel=self.per_pixel // count, border=border, reach=reach)

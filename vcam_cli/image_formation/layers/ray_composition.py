@@ -266,6 +266,16 @@ class _Cells:
 def aperture_points(count: int) -> Iterator[tuple[float, float]]:
     """Yield points of equal shares of a disc's area, in its radii: a spiral of golden angles.
 
+    Parameters
+    ----------
+    count : int
+        Number of points.
+
+    Yields
+    ------
+    tuple of float
+        Point (x, y) [radii].
+
     References
     ----------
     .. [1] H. Vogel, "A better way to construct the sunflower head", Math. Biosciences 44, 179-189,
@@ -296,7 +306,22 @@ def _moved(planes: Array, x: float, y: float, reach: int) -> Array:
 
 
 def box_means(plane: Array, at: Array, width: float) -> Array:
-    """Return the means of even rows over boxes of a width around places, counted in rows."""
+    """Return the means of even rows over boxes around places.
+
+    Parameters
+    ----------
+    plane : Array
+        Rows (n, ...) of values.
+    at : Array
+        Centers (m,) of the boxes [rows].
+    width : float
+        Width of the boxes [rows].
+
+    Returns
+    -------
+    Array
+        Means (m, ...), in the unit of the values.
+    """
     sums = np.concatenate([np.zeros_like(plane[:1]), np.cumsum(plane, axis=0)])
     low, high = (_interpolated(sums, at + side * width / 2) for side in (-1, 1))
     means: Array = (high - low) / plane.dtype.type(width)

@@ -33,7 +33,18 @@ _PATH = ("output", "isetcam")
 
 
 def check(camera: Camera) -> None:
-    """Raise BadInput for a camera that ISETCam's structures cannot hold."""
+    """Check that ISETCam's structures can hold the camera's frame, where they are written.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Raises
+    ------
+    BadInput
+        For scattered pixels, or unknown volts.
+    """
     if not camera.output.isetcam:
         return
     if camera.array.is_scattered:

@@ -41,7 +41,20 @@ from vcam_cli.simulation.photograph import Photograph
 
 
 def save(result: Photograph, out: Path) -> Path:
-    """Write all files of one run, the record too, into a folder; return it."""
+    """Write all files of one run, the record too, into a folder; return it.
+
+    Parameters
+    ----------
+    result : Photograph
+        Photograph to write.
+    out : Path
+        Folder.
+
+    Returns
+    -------
+    Path
+        The folder.
+    """
     inputs = provenance.inputs(result.frame.camera)
     start = time.perf_counter()
     computed = sum(result.stages.seconds.values())
@@ -54,9 +67,23 @@ def save(result: Photograph, out: Path) -> Path:
 def finish(
     result: Photograph, folder: OutputFolder, inputs: tuple[Path, ...], seconds: Callable[[], float]
 ) -> dict[str, Any]:
-    """Write the report where one is asked for, and the record; return what it says.
+    """Write the report where it is requested, and the record.
 
-    seconds: the time that all of it took so far [s].
+    Parameters
+    ----------
+    result : Photograph
+        Photograph to write.
+    folder : OutputFolder
+        Folder of the run.
+    inputs : tuple of Path
+        Files that the run read.
+    seconds : callable
+        Returns the time of the run so far [s].
+
+    Returns
+    -------
+    dict
+        Contents of `run.json`.
     """
     if result.frame.solved.output.report:
         from vcam_cli.simulation.output import run_report
@@ -69,7 +96,15 @@ def finish(
 
 
 def write(result: Photograph, folder: OutputFolder) -> None:
-    """Write the files of one run, all but the record `run.json`."""
+    """Write the files of one run, all but the record `run.json`.
+
+    Parameters
+    ----------
+    result : Photograph
+        Photograph to write.
+    folder : OutputFolder
+        Folder of the run.
+    """
     camera = result.frame.solved
     with ThreadPool(2) as pool:
         raw = (*_raw_jobs(result, folder), *_sample_jobs(result, folder))
@@ -114,7 +149,17 @@ def write(result: Photograph, folder: OutputFolder) -> None:
 
 
 def write_render(result: Photograph, path: Path, render: Array) -> None:
-    """Write the render, and how it was taken as its description."""
+    """Write the render, with its exposure as the description.
+
+    Parameters
+    ----------
+    result : Photograph
+        Photograph to write.
+    path : Path
+        File to write.
+    render : Array
+        Picture (h, w) or (h, w, 3), 8 or 16 bits.
+    """
     taken = raw_file.photograph(result.frame)
     write_png(path, render, "; ".join(f"{name} {value}" for name, value in taken.items()))
 
@@ -175,7 +220,15 @@ def _radiance(result: Photograph, path: Path) -> None:
 
 
 def write_raw(result: Photograph, path: Path) -> None:
-    """Write raw.exr."""
+    """Write raw.exr.
+
+    Parameters
+    ----------
+    result : Photograph
+        Photograph to write.
+    path : Path
+        File to write.
+    """
     raw_file.write_raw(path, result.frame, config_hash(result.frame.camera))
 
 
@@ -245,12 +298,38 @@ def _ideal_attributes(frame: Frame) -> dict[str, Attribute]:
 
 
 def config_hash(camera: Camera) -> str:
-    """Return the SHA-256 of the resolved camera."""
+    """Return the SHA-256 of the resolved camera.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Returns
+    -------
+    str
+        SHA-256 in hexadecimal digits.
+    """
     return hash_text(to_json(camera.model_dump(mode="json")))
 
 
 def record(result: Photograph, inputs: tuple[Path, ...], seconds: float) -> dict[str, Any]:
-    """Return what `run.json` says, but for the names of the files."""
+    """Return the contents of `run.json`, without the names of the files.
+
+    Parameters
+    ----------
+    result : Photograph
+        Photograph to write.
+    inputs : tuple of Path
+        Files that the run read.
+    seconds : float
+        Time of the run [s].
+
+    Returns
+    -------
+    dict
+        Contents, as JSON can hold them.
+    """
     frame = result.frame
     camera = frame.camera
     return {

@@ -20,7 +20,17 @@ MOST = 24
 
 
 def write_phase(path: Path, frame: Frame, config_hash: str) -> None:
-    """Write phase.exr, channels left and right [DN]."""
+    """Write phase.exr, channels left and right [DN].
+
+    Parameters
+    ----------
+    path : Path
+        File to write.
+    frame : Frame
+        Frame that was taken.
+    config_hash : str
+        SHA-256 of the resolved camera.
+    """
     assert frame.phase_dn is not None
     left, right = frame.phase_dn
     columns = min(left.shape[1], right.shape[1])  # of masked pixels one side may have one more
@@ -71,7 +81,15 @@ def _summed(codes: Array, height: int, width: int) -> Array:
 
 
 def write_disparity(path: Path, frame: Frame) -> None:
-    """Write disparity.png: far black, near light; gray where nothing tells it."""
+    """Write disparity.png: far black, near light; gray where the disparity is unknown.
+
+    Parameters
+    ----------
+    path : Path
+        File to write.
+    frame : Frame
+        Frame that was taken.
+    """
     found = frame_disparity(frame)
     known = found[np.isfinite(found)]
     low, high = np.percentile(known, (1, 99)) if known.size else (0.0, 1.0)

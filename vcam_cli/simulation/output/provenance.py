@@ -21,14 +21,35 @@ from vcam_cli.source_code import code_hash
 
 
 def inputs(camera: Camera) -> tuple[Path, ...]:
-    """Return every file that a run reads: YAML files, and what they name."""
+    """Return every file that a run reads: YAML files, and the files that they name.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Returns
+    -------
+    tuple of Path
+        Files, sorted.
+    """
     return tuple(sorted({*camera.files, *data_files(camera)}, key=str))
 
 
 def data_files(camera: Camera, form: dict[str, Any] | None = None) -> tuple[Path, ...]:
-    """Return the files that a camera names: pictures, tables, spectra, those that ship among them.
+    """Return the files that a camera names: pictures, tables and spectra, also those that ship.
 
-    form: its YAML form, where it is at hand.
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+    form : dict or None, optional
+        YAML form of the camera; by default it is computed.
+
+    Returns
+    -------
+    tuple of Path
+        Files.
     """
     form = camera.model_dump(mode="json") if form is None else form
 

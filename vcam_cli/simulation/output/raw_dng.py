@@ -62,7 +62,18 @@ _REMEDY = "write dng: false; tiff: true writes them as they are"
 
 
 def check(camera: Camera) -> None:
-    """Raise BadInput for a raw frame that raw converters would read wrong, or not at all."""
+    """Check that raw converters can read the camera's raw frame, where it is written as DNG.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Raises
+    ------
+    BadInput
+        For a frame that they read wrong, or not at all.
+    """
     if not camera.output.dng:
         return
     if camera.array.is_scattered:
@@ -89,7 +100,17 @@ def check(camera: Camera) -> None:
 
 
 def write_raw_dng(path: Path, frame: Frame, description: str) -> None:
-    """Write raw.dng."""
+    """Write raw.dng.
+
+    Parameters
+    ----------
+    path : Path
+        File to write.
+    frame : Frame
+        Frame that was taken.
+    description : str
+        Text for the tag ImageDescription.
+    """
     codes = np.moveaxis(frame.dn, 0, -1) if frame.layout.full_color else frame.dn
     levels = np.array([frame.black_dn, frame.chain.saturated_dn, frame.white_dn.max()])
     chain = frame.chain

@@ -43,7 +43,17 @@ Channel = Callable[[slice], Array]
 
 
 def write_raw(path: Path, frame: Frame, config_hash: str) -> None:
-    """Write raw.exr, block by block."""
+    """Write raw.exr, block by block.
+
+    Parameters
+    ----------
+    path : Path
+        File to write.
+    frame : Frame
+        Frame that was taken.
+    config_hash : str
+        SHA-256 of the resolved camera.
+    """
     values: Values = {
         "dn": (frame.dn, None),
         "electrons": (frame.electrons, None),
@@ -62,7 +72,17 @@ def write_raw(path: Path, frame: Frame, config_hash: str) -> None:
 
 
 def write_raw_tiff(path: Path, frame: Frame, config_hash: str) -> None:
-    """Write raw.tif; what raw.exr says of the frame is its description, as JSON."""
+    """Write raw.tif; the attributes of raw.exr are its description, as JSON.
+
+    Parameters
+    ----------
+    path : Path
+        File to write.
+    frame : Frame
+        Frame that was taken.
+    config_hash : str
+        SHA-256 of the resolved camera.
+    """
     codes = tiff.whole_numbers(frame.dn, white_level(frame))
     if frame.layout.full_color:
         codes = np.moveaxis(codes, 0, -1)
@@ -72,12 +92,35 @@ def write_raw_tiff(path: Path, frame: Frame, config_hash: str) -> None:
 
 
 def description(frame: Frame, config_hash: str) -> str:
-    """Return what the file says of the frame as JSON, for formats without attributes."""
+    """Return the attributes of the frame as JSON, for formats without attributes.
+
+    Parameters
+    ----------
+    frame : Frame
+        Frame that was taken.
+    config_hash : str
+        SHA-256 of the resolved camera.
+
+    Returns
+    -------
+    str
+        JSON.
+    """
     return json.dumps(attributes(frame, config_hash), indent=1)
 
 
 def write_hdr(path: Path, frame: Frame, config_hash: str) -> None:
-    """Write hdr.exr, the photocurrent that several samples tell [e/s]."""
+    """Write hdr.exr, the photocurrent that several samples estimate [e/s].
+
+    Parameters
+    ----------
+    path : Path
+        File to write.
+    frame : Frame
+        Frame that was taken.
+    config_hash : str
+        SHA-256 of the resolved camera.
+    """
     assert frame.photocurrent is not None
     said: dict[str, Attribute] = {
         **_camera_metadata(frame, config_hash),
@@ -169,12 +212,36 @@ def _meaning(frame: Frame) -> str:
 
 
 def white_level(frame: Frame) -> float:
-    """Return the highest code, of as many codes as are added [DN]."""
+    """Return the highest code; where codes are added, that of their sum.
+
+    Parameters
+    ----------
+    frame : Frame
+        Frame that was taken.
+
+    Returns
+    -------
+    float
+        Code [DN].
+    """
     return float(frame.chain.highest_dn)
 
 
 def attributes(frame: Frame, config_hash: str) -> dict[str, Attribute]:
-    """Return what the file says of the frame."""
+    """Return the attributes of the frame in the file.
+
+    Parameters
+    ----------
+    frame : Frame
+        Frame that was taken.
+    config_hash : str
+        SHA-256 of the resolved camera.
+
+    Returns
+    -------
+    dict of str to Attribute
+        Attributes by name.
+    """
     e = frame.electrical
     return {
         **_camera_metadata(frame, config_hash),
@@ -190,7 +257,18 @@ def attributes(frame: Frame, config_hash: str) -> dict[str, Attribute]:
 
 
 def photograph(frame: Frame) -> dict[str, Attribute]:
-    """Return how the picture was taken, by the names and in the units of OpenEXR's standard."""
+    """Return the exposure and lens, by the names and in the units of OpenEXR's standard.
+
+    Parameters
+    ----------
+    frame : Frame
+        Frame that was taken.
+
+    Returns
+    -------
+    dict of str to Attribute
+        Attributes by name.
+    """
     iso = frame.base_iso * frame.solved.gain
     light = frame.solved.scene.illuminant
     return {

@@ -25,7 +25,18 @@ BINS = 256
 
 
 def channel_style(frame: Frame) -> list[dict[str, Any]]:
-    """Return color, dashes and label of each color's curves."""
+    """Return color, dashes and label of each color's curves.
+
+    Parameters
+    ----------
+    frame : Frame
+        Frame that was taken.
+
+    Returns
+    -------
+    list of dict
+        Keyword arguments of matplotlib, one dict a color.
+    """
     others = iter(COLORS[3:])
     return [
         {
@@ -38,10 +49,20 @@ def channel_style(frame: Frame) -> list[dict[str, Any]]:
 
 
 def noise_parts(frame: Frame) -> tuple[Array, dict[str, Array]]:
-    """Return signals of a pixel (n,) [e], and the variance that each source adds to each [e^2].
+    """Return the variance that each noise source adds to a pixel, by signal.
 
-    Sources are those that the plan has on, and the rounding of the ADC. Of pixels that are read as
-    one, variances are of their mean.
+    Sources are those that the plan has on, and the rounding of the ADC. Variances of pixels that
+    are read as one are of their mean.
+
+    Parameters
+    ----------
+    frame : Frame
+        Frame that was taken.
+
+    Returns
+    -------
+    tuple
+        Signals (n,) [electrons], and variances (n,) by source [electrons squared].
     """
     binning, dark = frame.layout.binning_groups.binning, frame.dark_rate * frame.exposure_time
     signal = np.geomspace(1, max(frame.electrical.full_well, 10), LEVELS)
@@ -57,7 +78,14 @@ def noise_parts(frame: Frame) -> tuple[Array, dict[str, Array]]:
 def draw_noise_budget(figure: Any, frame: Frame, names: Sequence[str]) -> None:
     """Draw the share of each noise source in the variance over the signal, stacked.
 
-    names: what the sources are called, in the order of `noise_parts`.
+    Parameters
+    ----------
+    figure : Any
+        Figure of matplotlib to draw on.
+    frame : Frame
+        Frame that was taken.
+    names : sequence of str
+        Labels of the sources, in the order of `noise_parts`.
     """
     signal, parts = noise_parts(frame)
     axes = figure.add_subplot()
@@ -75,7 +103,15 @@ def draw_noise_budget(figure: Any, frame: Frame, names: Sequence[str]) -> None:
 
 
 def draw_snr(figure: Any, frame: Frame) -> None:
-    """Draw the signal over temporal noise and over all noise, with the shot-noise limit."""
+    """Draw the SNR with temporal noise and with all noise, beside the shot-noise limit.
+
+    Parameters
+    ----------
+    figure : Any
+        Figure of matplotlib to draw on.
+    frame : Frame
+        Frame that was taken.
+    """
     signal, parts = noise_parts(frame)
     temporal = [s.name for s in noise_sources(frame.plan.active, "frame")]
     of_time = sum(parts[name] for name in [*temporal, "quantization"])
@@ -95,7 +131,15 @@ def draw_snr(figure: Any, frame: Frame) -> None:
 
 
 def mark_scene(axes: Any, frame: Frame) -> None:
-    """Mark from where to where the scene's own signals lie."""
+    """Mark the range of the scene's own signals.
+
+    Parameters
+    ----------
+    axes : Any
+        Axes of matplotlib, with the signal along x.
+    frame : Frame
+        Frame that was taken.
+    """
     dark = frame.dark_rate * frame.exposure_time
     levels = [level - dark for level in frame.plan.levels if level - dark > 1]
     if levels:
@@ -103,7 +147,15 @@ def mark_scene(axes: Any, frame: Frame) -> None:
 
 
 def draw_spectra(figure: Any, frame: Frame) -> None:
-    """Draw the light of white, what lens, filters and silicon leave of it, and its electrons."""
+    """Draw the light of white, the quantum efficiency with lens and filters, and the signal.
+
+    Parameters
+    ----------
+    figure : Any
+        Figure of matplotlib to draw on.
+    frame : Frame
+        Frame that was taken.
+    """
     band = frame.solved.scene.wavelengths
     wavelengths = np.linspace(band.start, band.stop, 401)
     light, responses = photons(frame.scene.white), frame.solved.response.spectra
@@ -145,9 +197,19 @@ def _integral(spectrum: Spectrum, wavelengths: Array) -> float:
 
 
 def mtf_parts(frame: Frame) -> tuple[Array, dict[str, Array]]:
-    """Return frequencies along a row (n,) [cycles/m], and what each effect leaves of waves.
+    """Return the MTF of each effect along a row.
 
     They are those at the wavelength in the middle of the scene's light.
+
+    Parameters
+    ----------
+    frame : Frame
+        Frame that was taken.
+
+    Returns
+    -------
+    tuple
+        Frequencies (n,) [cycles/m], and MTFs (n,) by effect.
     """
     frequency = np.linspace(0, 1 / frame.geometry.pitch_x, FREQUENCIES)
     transfer = frame.transfer
@@ -159,9 +221,16 @@ def mtf_parts(frame: Frame) -> tuple[Array, dict[str, Array]]:
 
 
 def draw_mtf(figure: Any, frame: Frame, names: Sequence[str]) -> None:
-    """Draw what each effect leaves of the contrast of waves along a row, and all together.
+    """Draw the MTF of each effect along a row, and their product.
 
-    names: what the effects are called, in the order of `mtf_parts`.
+    Parameters
+    ----------
+    figure : Any
+        Figure of matplotlib to draw on.
+    frame : Frame
+        Frame that was taken.
+    names : sequence of str
+        Labels of the effects, in the order of `mtf_parts`.
     """
     frequency, parts = mtf_parts(frame)
     axes = figure.add_subplot()
@@ -179,7 +248,18 @@ def draw_mtf(figure: Any, frame: Frame, names: Sequence[str]) -> None:
 
 
 def histogram(frame: Frame) -> tuple[Array, list[Array]]:
-    """Return the edges (n + 1,) of bins [DN], and the pixels of each color in them."""
+    """Return the histogram of the codes of each color.
+
+    Parameters
+    ----------
+    frame : Frame
+        Frame that was taken.
+
+    Returns
+    -------
+    tuple
+        Edges (n + 1,) of the bins [DN], and numbers of pixels (n,) of each color.
+    """
     top = frame.chain.highest_dn
     bins = min(BINS, top + 1)
     edges = np.linspace(-0.5, top + 0.5, bins + 1)
@@ -192,7 +272,15 @@ def histogram(frame: Frame) -> tuple[Array, list[Array]]:
 
 
 def draw_histogram(figure: Any, frame: Frame) -> None:
-    """Draw how many pixels of each color have which code."""
+    """Draw the histogram of the codes of each color.
+
+    Parameters
+    ----------
+    figure : Any
+        Figure of matplotlib to draw on.
+    frame : Frame
+        Frame that was taken.
+    """
     edges, counts = histogram(frame)
     axes = figure.add_subplot()
     for count, style in zip(counts, channel_style(frame), strict=True):

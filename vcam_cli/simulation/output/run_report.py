@@ -29,12 +29,40 @@ GROUP = "frame"
 
 
 def write(path: Path, result: Photograph, record: Mapping[str, Any]) -> None:
-    """Write report.html of a run; record: what `run.json` will say. Raise CannotDo."""
+    """Write report.html of a run.
+
+    Parameters
+    ----------
+    path : Path
+        File to write.
+    result : Photograph
+        Photograph to write.
+    record : mapping
+        Contents of `run.json`.
+
+    Raises
+    ------
+    CannotDo
+        Where matplotlib is not installed.
+    """
     page.write(path, report(result, record))
 
 
 def report(result: Photograph, record: Mapping[str, Any]) -> Page:
-    """Return the report of a run; record: what `run.json` will say."""
+    """Return the report of a run.
+
+    Parameters
+    ----------
+    result : Photograph
+        Photograph to write.
+    record : mapping
+        Contents of `run.json`.
+
+    Returns
+    -------
+    Page
+        Page with its plots.
+    """
     frame = result.frame
     return Page(
         title=f"{record['name']}: one photograph",
