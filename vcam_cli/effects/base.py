@@ -73,7 +73,7 @@ def of_kind(effects: Iterable[Effect], *kinds: type[Kind]) -> tuple[Kind, ...]:
 
 @dataclass(frozen=True)
 class SignalLevels:
-    """What is known of the signal before a frame is computed; bounds refer to it."""
+    """Levels of the signal before a frame is computed; bounds refer to them."""
 
     full_signal: float
     """Largest noise-free mean signal on the array, at most the full well [electrons]."""
@@ -195,7 +195,7 @@ class Effect(ABC):
         Parameters
         ----------
         signal : SignalLevels
-            What is known of the signal.
+            Levels of the signal.
         others : sequence of Effect
             Effects that are wanted beside this one.
 
@@ -204,7 +204,7 @@ class Effect(ABC):
         share : float or None
             Share without unit; None where no bound is known before the light is.
         unit : str
-            What it is a share of, with its preposition; empty where there is none.
+            Quantity that the share refers to, with its preposition; empty without a share.
         """
         error = self.mean_error(signal)
         return (None, "") if error is None else (error / signal.full_signal, "of full signal")

@@ -200,7 +200,7 @@ def _automatic_offset(camera: Camera, found: Circuit) -> float:
 def _codes_of_share(share: float, own: float, highest: int) -> float:
     """Return the positive root of offset^2 = share^2 (highest - offset)^2 + own^2 [DN].
 
-    It is `highest` where there is none below.
+    It is `highest` where no root lies below.
     """
     if not own:
         return highest * share / (1 + share)

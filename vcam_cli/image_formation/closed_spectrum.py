@@ -183,7 +183,7 @@ STEP = 0.01
 
 @dataclass(frozen=True, eq=False)
 class DiscSpectrum:
-    """The spectrum of even rectangles and of discs on them, as far as it is used."""
+    """The spectrum of even rectangles and of discs on them, at the frequencies used."""
 
     even: ProductSpectrum
     discs: tuple[DiscWaves, ...]
@@ -276,7 +276,7 @@ def disc_waves(disc: LightDisc, scene: ChartScene, axes: Sequence[Axis]) -> Disc
 
 @dataclass(frozen=True, eq=False)
 class ProductSpectrum:
-    """A spectrum as a sum of products of functions of both axes, as far as it is used."""
+    """A spectrum as a sum of products of functions of both axes, at the frequencies used."""
 
     along_y: Array
     """(ny, d) coefficients along y of d functions."""

@@ -284,7 +284,7 @@ def _even_cells(size: float, pitch: float) -> int:
 
 
 def _part(chart: ChartScene, cells: list[int], pitch: list[float], sign: int) -> FarPart:
-    """Return a rectangle of so many cells of a pitch [m] on either side of the center, x and y."""
+    """Return a rectangle of `cells` of a pitch [m] on either side of the center, x and y."""
     width, height = (2 * n * p for n, p in zip(cells, pitch, strict=True))
     part = chart.crop((0.0, 0.0), width, height).with_cells((2 * cells[1], 2 * cells[0]))
     return FarPart(part, sign)

@@ -5,7 +5,7 @@ theirs in between. Filtering the picture once for each place would cost dozens o
 but a lens that is symmetric about its axis only turns with the azimuth. By harmonics of the
 direction of the frequency that is a factor: cos m(theta - phi) = cos m theta cos m phi + sin m
 theta sin m phi. So the mean of all places, and of each harmonic a few singular vectors over the
-rings, stand for the field within a known error (as eigen-images of point spread functions do:
+rings, represent the field within a known error (as eigen-images of point spread functions do:
 Lauer, Proc. SPIE 4847, 2002). Each is one table over |f| and one filter, whose result is weighted
 by a smooth map.
 
@@ -301,7 +301,7 @@ class Family:
 
 
 def _families(changes: Sequence[Array], allowed: float) -> tuple[list[tuple[Family, Array]], float]:
-    """Return the modes, strongest first, and the error of what is left.
+    """Return the modes, strongest first, and the error of leaving out the others.
 
     A mode is its family, and its share in each ring. The error of a ring is the rms of its tables,
     each entry weighed by its expected power, in the mean over colors. Singular vectors come from

@@ -123,7 +123,7 @@ def light_plan(path: OpticalPath, scene: AnyScene) -> LightPlan:
     Returns
     -------
     LightPlan
-        What is left out, and what each effect changes at most.
+        Skipped effects, and the largest change by each effect.
     """
     candidates = of_kind(path.optional, *KINDS)
     if not candidates:

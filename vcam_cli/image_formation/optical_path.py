@@ -75,14 +75,14 @@ class OpticalPath:
     effects: tuple[Effect, ...]
     workers: int
     ceiling: float = np.inf
-    """Rate that fills a pixel by the end of the exposure, as far as it is known; brighter ones all
+    """Rate that fills a pixel by the end of the exposure, inf where unknown; brighter ones all
     look alike [e/s]."""
     full: float = np.inf
-    """Signal to which errors are relative: the largest on the array, at most the ceiling, as far as
-    it is known [e/s]."""
+    """Signal to which errors are relative: the largest on the array, at most the ceiling; inf
+    where unknown [e/s]."""
     fullness: float = 0.0
-    """Light of the darkest place of the scene over that which fills a pixel whatever its noise, by
-    white on the axis; 0 where it is not known."""
+    """Light of the darkest place of the scene over the light that fills a pixel whatever its noise,
+    by white on the axis; 0 where it is not known."""
     optional: tuple[Effect, ...] = ()
     """Effects that may be left out where the scene does not call for them."""
     layers: tuple[LayerOptics, ...] = ()
@@ -173,12 +173,12 @@ class OpticalPath:
 
     @cached_property
     def field_rings(self) -> tuple[Zone, ...]:
-        """Places of that blur on the half-axis to the right; none where there is none."""
+        """Places of that blur on the half-axis to the right; () without such a blur."""
         return () if self.field is None else self.field.rings(self.settings.field_zones)
 
     @cached_property
     def zones(self) -> tuple[Zone, ...]:
-        """Its zones, turned with the azimuth; none where there is none."""
+        """Its zones, turned with the azimuth; () without such a blur."""
         return () if self.field is None else self.field.zones(self.settings.field_zones)
 
 
@@ -249,8 +249,7 @@ class SpectrumReport:
     cells_per_pixel: float = 0.0
     """Cells of a painted chart per pixel pitch; 0 where there are none."""
     is_averaged: bool = False
-    """Whether it was averaged over the photodetectors, no blur being there that asks for its
-    spectrum."""
+    """Whether it was averaged over the photodetectors, as no blur needs its spectrum."""
     is_painted: bool = False
     """Whether they had to be painted, as those of a chart."""
     edge_seconds: float = 0.0

@@ -114,7 +114,7 @@ def photo_rate(path: OpticalPath, scene: AnyScene, planes: bool = False) -> Rate
     while True:
         found = _gathered(path, scene, planes)
         full = min(float(found.values.max(initial=0.0)), path.ceiling)
-        # What is left out lies below the frequencies that are lost: their squares add.
+        # Skipped effects err below the frequencies that are lost: their squares add.
         error = math.hypot(found.spectrum.lost_rms, plan.share * full)
         if full >= path.full or error <= USED_SHARE * path.settings.tolerance * full:
             return replace(found, plan=plan)

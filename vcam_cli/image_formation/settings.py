@@ -35,11 +35,11 @@ class Settings:
     tolerance lets it, far above the error of 32 bits, while that of a picture may be whole."""
     oversampling: float | None = None
     """Cells per pixel pitch of a chart, and highest frequency of any spectrum in pixel Nyquist
-    frequencies; None: what the tolerance asks for."""
+    frequencies; None: as the tolerance requires."""
     shot_noise: str = "exact"
     """exact (Poisson) or gaussian (as the thesis has it)."""
     spectral_rank: int | None = None
-    """Largest number of mixtures that stand for the scene's spectra; None: as many as needed."""
+    """Largest number of mixtures that replace the scene's spectra; None: as many as needed."""
     vignetting_points: int | None = None
     """Places along each half of the array at which pixel vignetting is integrated; None: as many
     as needed."""

@@ -61,7 +61,7 @@ from vcam_cli.scenes.layered import AnyScene, LayeredScene
 from vcam_cli.scenes.waves import WaveScene
 
 SMOOTH = 16
-"""Parts of a table over each of which it is a cubic, to rounding."""
+"""Parts of a table; over each part it is a cubic, to rounding."""
 PERIODS = 8
 """Parts of a period of a blur's phase over which it is a cubic."""
 
@@ -117,7 +117,7 @@ def image_layers(path: OpticalPath, scene: AnyScene) -> tuple[Layers, SpectrumRe
 
 
 def _dark_layers(path: OpticalPath) -> tuple[Layers, SpectrumReport]:
-    """Return the image where no color sees light: there is none, whatever blurs it."""
+    """Return the image where no color sees light: 0, whatever blurs it."""
     dark: Array = np.zeros((path.geometry.rows, path.geometry.columns), path.settings.dtype)
     blurs = of_kind(path.effects, Blur, SeparableTransfer, FieldTransfer)
     report = SpectrumReport(changes=dict.fromkeys((effect.name for effect in blurs), 0.0))

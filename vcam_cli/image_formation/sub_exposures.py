@@ -1,6 +1,6 @@
 """An image that turns or shakes while it is exposed: the mean of the still image at other places.
 
-The still image is computed once, on places finer than the pixels, each of which sees it as a pixel
+The still image is computed once, on places finer than the pixels. Each place sees it as a pixel
 there would. At every instant of the exposure a pixel looks where in that image it is just then, by
 splines. Two errors are left, each measured and kept below its share of the tolerance:
 
@@ -39,7 +39,7 @@ INSTANT_SHARE = 0.1
 ORDER: Final = 5
 """Order of the splines."""
 FEWEST_PLACES, MOST_PLACES = 3, 12
-"""Fine places along each side of a pixel, but for waves, which may ask for more: behind a pixel's
+"""Fine places along each side of a pixel, but for waves, which may need more: behind a pixel's
 aperture 12 leave less than 2e-5 of full signal between sharp edges."""
 FINER = 0.002
 """Tolerance below which twice the fewest are tried first."""
@@ -102,7 +102,7 @@ class FineImage:
 
 
 def sub_exposed_motion(path: OpticalPath) -> SubExposedMotion | None:
-    """Return the motion of a path that asks for sub-exposures; None where there is none.
+    """Return the motion of a path that needs sub-exposures; None for other paths.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def _fine_image(
     path: OpticalPath,
     form_image: FormImage,
 ) -> tuple[FineImage, SpectrumReport]:
-    """Return the still image on places as fine as the tolerance asks for."""
+    """Return the still image on places as fine as the tolerance requires."""
     per_pixel = FEWEST_PLACES * (1 if path.settings.tolerance >= FINER else 2)
     if isinstance(scene, WaveScene):
         highest = max((math.hypot(w.fx, w.fy) for w in scene.waves), default=0.0)
@@ -216,7 +216,7 @@ def _image_on(
     per_pixel: int,
     form_image: FormImage,
 ) -> tuple[FineImage, SpectrumReport]:
-    """Return the still image on so many places along each side of a pixel."""
+    """Return the still image on `per_pixel` places along each side of a pixel."""
     g = still.geometry
     border = math.ceil(motion.travel / min(g.pitch_x, g.pitch_y)) + 1
     rows, columns = (per_pixel * (count + 2 * border) for count in (g.rows, g.columns))

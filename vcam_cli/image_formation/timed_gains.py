@@ -26,7 +26,7 @@ def light_plan(
     Parameters
     ----------
     plan : LightPlan
-        What is left out already.
+        Effects that are skipped already.
     effects, optional : sequence of Effect
         Effects that act, and those that may be left out.
     time : float

@@ -40,7 +40,7 @@ class TableSize:
     steps_per_period: float
     """Entries over fx and fy in one period of the phase of the widest blur."""
     rank: int | None = None
-    """Largest number of mixtures; None: as many as the tolerance asks for."""
+    """Largest number of mixtures; None: as many as the tolerance requires."""
 
     def plane_entries(self, blurs: Sequence[PlaneTransfer]) -> int:
         """Return the entries along an axis of a table over fx and fy for these blurs.
@@ -82,7 +82,7 @@ class Tables:
     """By `PARITIES`, (R, C, m, m) over fy and fx from 0 to `top`: what is added to the radial part.
     A wave cos(2 pi fx x) cos(2 pi fy y) becomes the sum of its cosines and sines times these."""
     order: int = 0
-    """The radial part is times the cosine of so many times the direction of f from x towards y,"""
+    """The radial part is times the cosine of `order` times the direction of f from x towards y,"""
     is_sine: bool = False
     """or times its sine, and has the parity that it thereby has."""
 

@@ -237,7 +237,7 @@ class _SeenScene:
 
 
 def _widest_cells(path: OpticalPath, sees: SmoothMap) -> float:
-    """Return the width of cells that boxes stand for, at most [m].
+    """Return the largest width of cells that boxes may replace [m].
 
     Boxes have the second moments of what cells of side d see, but not the fourth: of a wave of f
     cycles along both axes they miss about skew (2 pi f d)^4 / 60.
@@ -282,7 +282,7 @@ def _share_of(path: OpticalPath, share: Array) -> OpticalPath:
 
 
 def _joined(path: OpticalPath, reports: Sequence[SpectrumReport]) -> SpectrumReport:
-    """Return what is known of parts of the light together."""
+    """Return the joint report on parts of the light."""
     first, *others = reports
     if not others:
         return first
@@ -437,8 +437,8 @@ def _groups(path: OpticalPath, seen: _SeenScene, warps: Warps) -> list[tuple[flo
 
     Between two of them light is straight in the way that the corner goes from one to the other. An
     image that is displaced by u d, 0 <= u <= 1, errs there by u (1 - u) / 2 (2 pi f d)^2 of a wave
-    at most, and by 1 whatever it is: summed up over the edges of the scene, as far as lens and
-    pixels let them pass.
+    at most, and by 1 whatever it is: summed up over the edges of the scene, as lens and pixels
+    blur them.
     """
     wavelengths, g = path.transfer.wavelengths, path.geometry
     corner = np.array([g.sensor_width / 2]), np.array([g.sensor_height / 2])

@@ -29,7 +29,7 @@ def bracket_cameras(camera: Camera) -> tuple[Camera, ...]:
     Parameters
     ----------
     camera : Camera
-        A camera whose file asks for a bracket.
+        A camera whose file has a bracket.
     """
     given, lines = camera.exposure, line_times(camera, geometry(camera))
     reference = given.reference

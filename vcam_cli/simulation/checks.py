@@ -1,7 +1,7 @@
 """What a run would refuse only later, found when its camera file is read.
 
 The file's own contradictions are `camera.load`'s business; here is what takes the engine, the
-processing or the picture to know. What only some cameras ask for is imported where it is checked:
+processing or the picture to know. What only some cameras need is imported where it is checked:
 `vcam validate` starts twice as fast.
 """
 
@@ -229,7 +229,7 @@ def _check_crops_of_layers(source: Layers) -> None:
 
 
 def _check_crop(crop: Crop, size: tuple[int, int], place: tuple[str | int, ...]) -> None:
-    """Refuse a crop that goes beyond its picture of so many rows and columns (BadInput)."""
+    """Refuse a crop that goes beyond its picture of `size`, rows and columns (BadInput)."""
     for name, part, whole in zip(("rows", "columns"), crop.window, size, strict=True):
         if part.stop > whole:
             message = f"the crop ends at {part.stop}, the picture has {whole} {name}"

@@ -49,7 +49,7 @@ class ExposedLight:
     changes: dict[str, float]
     """Effect on pixels or charge -> rms change of the mean signal by leaving it out [e/s]."""
     light_plan: LightPlan
-    """That of the light, with what is left out now that the exposure time is known."""
+    """That of the light, with the effects skipped now that the exposure time is known."""
     step_rates: tuple[Array, ...]
     """As `Prepared.step_rates`."""
     full_charge: Array | None

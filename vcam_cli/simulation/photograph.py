@@ -1,4 +1,4 @@
-"""A simulated photograph: all that a frame tells, each computed when it is first asked for."""
+"""A simulated photograph: results of a frame, each computed when it is first used."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Photograph:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a user should know of the frame, and of the picture where one is asked for."""
+        """What a user should know of the frame, and of a requested picture."""
         shown = needs_picture(self.frame.solved)
         return (*self.remarks, *(self.processed.notes if shown else ()))
 
@@ -220,7 +220,7 @@ class Photograph:
     @cached_property
     @own_float_errors
     def metrics(self) -> Metrics:
-        """Metric -> value: those every run has, then those that `quality` asks for."""
+        """Metric -> value: those every run has, then those that `quality` lists."""
         out = figures(self.frame)
         if {"mse", "psnr"} & set(self.frame.solved.quality):
             image, ideal = self.linear, self.ideal

@@ -4,14 +4,14 @@
     ------------  ------------------------  -------------  -------------------------------------
     read          Camera                    ReadCamera     files of the lens and of the scene
     solve         Camera                    Solved         geometry, circuit, effects, settings
-    focus         Solved                    Solved         autofocus, where the file asks for it
+    focus         Solved                    Solved         autofocus, where the file has it
     scene         Solved, files             SceneLight     scene on the lattice, white, transfer
     light         SceneLight                Rate           mean light on the lattice [e/s]
     exposure      SceneLight, Rate          ExposedLight   time and gain; mean light of nodes [e/s]
     plan          ... and ExposedLight      Prepared       which effects run
     charge, DN    Prepared                  Frame          time x light + dark current, before_shot,
                                                            noise, full well, ADC
-    picture       Frame                     processing     demosaic to tone, when it is asked for
+    picture       Frame                     processing     demosaic to tone, when it is used
 
 Every stage takes records and returns one; none of them is changed. What each effect does in its
 stage, `before_shot` among them, is in the table of `effects/order.py`.

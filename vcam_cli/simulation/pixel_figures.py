@@ -1,4 +1,4 @@
-"""What is known of a pixel's signal and noise without a frame: eqs 3.1 and 3.2.
+"""SNR and dynamic range of a pixel without a frame: eqs 3.1 and 3.2.
 
 Reference: T. Chen, "Digital Camera System Simulator and Applications", PhD thesis, Stanford
 University, 2003, section 3.2.1.
@@ -16,7 +16,7 @@ from vcam_cli.readout.exposure import mean_dark
 from vcam_cli.solve.solved import Solved
 
 SHARE = 0.2
-"""Of the well: the signal that the SNR is told of."""
+"""Signal at which the SNR is stated, over the well."""
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """The plan: which effects run, which do not, and why.
 
 The section keys of a camera file say what exists; `effects` says what the user wants simulated;
-what is left to the plan is decided by two promises, with tolerance T:
+the plan decides on the other effects by two promises, with tolerance T:
 
 - mean: all that is left out changes the mean raw by at most T / 2 of full signal, rms over the
   array; with what the settings err, the squares of which add to it, it stays within T;
@@ -267,7 +267,7 @@ def _idle_parts(
 
 @dataclass(frozen=True)
 class _Weighing:
-    """What is known of every effect when it is decided."""
+    """Costs and errors of every effect when the plan decides on it."""
 
     present: Sequence[Effect]
     signal: SignalLevels

@@ -135,7 +135,7 @@ def _blind_colors(ready: Prepared) -> tuple[str, ...]:
 
 
 def _motion(ready: Prepared) -> tuple[str, ...]:
-    """Return what motion brings in that the file does not have, and what is left out of it."""
+    """Return notes on effects of motion that the file does not have, and on skipped ones."""
     g, turn = ready.geometry, ready.solved.scene.camera_motion
     notes = []
     pixels = sum((e.travel for e in of_kind(ready.plan.active, ImageMotion)), 0.0) / g.pitch_x
@@ -209,7 +209,7 @@ def _depth(ready: Prepared) -> tuple[str, ...]:
             how += f", elsewhere at most {100 * found.left_out:.2g} % of full signal is skipped"
         notes.append(
             f"{how}: predicted error {100 * found.error:.2g} % of full signal"
-            + (", more than accuracy asks for" if more else "")
+            + (", more than the tolerance" if more else "")
         )
     return (*notes, *_cut(ready))
 
@@ -224,7 +224,7 @@ def _cut(ready: Prepared) -> tuple[str, ...]:
     how = ""
     if found.cell:
         how = f", composited ray by ray on cells of {found.cell * 1e6:.3g} um"
-    more = ", more than accuracy asks for" if found.error > ready.settings.tolerance else ""
+    more = ", more than the tolerance" if found.error > ready.settings.tolerance else ""
     notes = [
         f"depth from {near} to {far} is cut into {found.layers} layers: defocus blurs points to"
         f" {min(pixels):.3g} to {max(pixels):.3g} pixels{how}: predicted error"
@@ -347,7 +347,7 @@ def _colors_of_picture(ready: Prepared) -> tuple[str, ...]:
 
 
 def _steps_not_shown(ready: Prepared) -> tuple[str, ...]:
-    """Return why there are no pictures after the first steps, where they are asked for."""
+    """Return why there are no pictures after the first steps, where they are requested."""
     if not (ready.solved.output.steps and ready.solved.processing):
         return ()
     colors = ready.mosaic.colors

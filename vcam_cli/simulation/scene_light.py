@@ -209,7 +209,7 @@ def _brightest_around(scene: AnyScene) -> float:
 
 
 def _fullness(solved: Solved, scene: AnyScene, white_rate: float) -> float:
-    """Return the darkest light of a scene over that which fills a pixel whatever its noise.
+    """Return the darkest light of a scene over the light that fills a pixel whatever its noise.
 
     `white_rate` is that of the perfect white in the color with least light [e/s]. It is 0 where
     the darkest light is not known, or more than one charge, sample or time decides what is full.

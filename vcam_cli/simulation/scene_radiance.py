@@ -1,9 +1,9 @@
 """The scene as simulated: its spectral radiance, as a file that is a scene again.
 
-Pictures and spectral files are written sample by sample, on the sensor's plane and beyond the array
-as far as they go on; charts as averages over cells, `CELLS` to a pixel pitch, as far as blurs
-reach. A sample is the square of light that it is when the file is read: with its width as the
-scene's extent and its radiances as they are, it makes the same frame.
+Pictures and spectral files are written sample by sample, on the sensor's plane, also beyond the
+array; charts as averages over cells, `CELLS` to a pixel pitch, up to the reach of blurs. A sample
+is the square of light that it is when the file is read: with its width as the scene's extent and
+its radiances as they are, it makes the same frame.
 
 Values are means over bands that fall straight to 0 at the neighboring wavelengths, so that the
 light between two wavelengths is kept, lines included, whatever spectrum it has.
@@ -32,7 +32,7 @@ PATH = ("output", "radiance")
 CELLS = 4
 """Cells of a chart in a pixel pitch: an edge within one is displaced by an eighth pixel at most."""
 MARGIN = 16
-"""Pixels that a chart goes on beyond the array: as far as blurs of sharp lenses reach."""
+"""Pixels that a chart goes on beyond the array: the reach of sharp lenses' blurs."""
 STEP = 2e-9
 """Step of the wavelengths where the camera names none [m]: straight lines between them keep frames
 of the shipped pictures to 4e-7 of the brightest pixel (5 nm: 4e-6)."""

@@ -130,7 +130,7 @@ def measure(
 
 @contextmanager
 def _pinned(workers: int) -> Iterator[None]:
-    """Let the process run on so many processors only, where the system can do that."""
+    """Let the process run on `workers` processors only, where the system can do that."""
     if not hasattr(os, "sched_setaffinity"):
         yield
         return

@@ -1,8 +1,8 @@
 """Keys of a camera file that can change no number of its results, and why.
 
-A key that is written and does nothing is a misunderstanding: the user is told. Only keys that
+A key that is written and does nothing is a misunderstanding: a note reports it. Only keys that
 differ from their default count. What the picture decides, such as a longest exposure time that is
-not reached, is no matter of the file and not told here.
+not reached, is no matter of the file and not reported here.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Rule:
     paths: tuple[str, ...]
     is_idle: Callable[[Camera], bool]
     why: str
-    """Reason and remedy, behind a colon; ARCHITECTURE stands for the pixel's."""
+    """Reason and remedy, behind a colon; ARCHITECTURE is replaced by the pixel's."""
 
 
 def _gain_cancels(camera: Camera) -> bool:
@@ -112,7 +112,7 @@ RULES = (
     Rule(
         ("exposure.auto.percentile",),
         lambda camera: camera.exposure.auto is None or camera.exposure.auto.method != "percentile",
-        "the automatic exposure goes by another level; write method: percentile",
+        "the automatic exposure uses another level; write method: percentile",
     ),
     FOLLOW,
     Rule(
@@ -195,7 +195,7 @@ RULES = (
     Rule(
         ("output.steps",),
         lambda camera: not camera.processing,
-        "no steps are asked for; give processing",
+        "the camera has no processing steps; give processing",
     ),
     Rule(
         ("display.gamma", "display.white"),

@@ -1,4 +1,4 @@
-"""ISO speed of a camera: how much light fills it, and which gain an ISO speed asks for.
+"""ISO speed of a camera: the light that fills it, and the gain for an ISO speed.
 
 Saturation-based, as ISO 12232 defines it: the camera faces daylight, and the exposure of the focal
 plane [lx s] is sought at which its brightest color is full, in the pixel or in the ADC. Light is
@@ -118,7 +118,7 @@ def limited(exposure: Exposure, base_iso: float, least: float) -> Exposure:
 
 
 def gain(exposure: Exposure, base_iso: float, given: float) -> float:
-    """Return the gain that an ISO speed asks for, gain = iso / base_iso.
+    """Return the gain for an ISO speed, gain = iso / base_iso.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def gain(exposure: Exposure, base_iso: float, given: float) -> float:
     base_iso : float
         ISO speed of the camera at gain 1; 0 of one that sees nothing of daylight.
     given : float
-        Gain where no ISO speed is asked for.
+        Gain where the exposure sets no ISO speed.
 
     Returns
     -------

@@ -45,7 +45,7 @@ def camera_layout(camera: Camera, geometry: Geometry) -> Layout:
     Raises
     ------
     BadInput
-        For pixels that cannot be read as one in the groups that the file asks for.
+        For pixels that cannot be read as one in the groups of the file.
     CannotDo
         Where the positions of pixels need too fine a lattice.
     """
@@ -88,7 +88,7 @@ def binning_groups(camera: Camera, block: Block, g: Geometry) -> BinningGroups:
     Parameters
     ----------
     camera : Camera
-        Camera whose file may ask for binning.
+        Camera whose file may have binning.
     block : Block
         Colors of the array's repeating block; ((color,),) where all pixels have the same colors.
     g : Geometry

@@ -53,7 +53,7 @@ class RaisedCodes(Quantizer):
         return np.clip(np.rint(self.response(electrons)), 0, self.highest)
 
     def moved(self, electrons: Array, codes: Array) -> Array:
-        """Return the signal whose response is by so many codes [DN] another one [electrons]."""
+        """Return the signal whose response differs by codes [DN] from another's [electrons]."""
         return self.adc.moved(electrons, codes)
 
     def linear(self, dn: Array) -> Array:

@@ -1,8 +1,8 @@
 """All that follows from a camera before any light is known, solved once a frame.
 
 Nothing behind `solve` reads a `Camera`: what a file says is in the sections that `Solved` shows as
-they are (scene, exposure, output and so on), what follows from it is solved here. Who needs a
-camera with other values, to meter or to focus, asks for one by its methods.
+they are (scene, exposure, output and so on), what follows from it is solved here. Its methods
+return cameras with other values, to meter or to focus.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ class Solved:
 
     @property
     def binning(self) -> Binning | None:
-        """How pixels are read as one; None where the file does not ask for it."""
+        """How pixels are read as one; None without binning."""
         return self.camera.array.binning
 
     @property
@@ -135,7 +135,7 @@ class Solved:
 
     @property
     def quality(self) -> tuple[str, ...]:
-        """Metrics of the picture that are asked for."""
+        """Requested metrics of the picture."""
         return self.camera.quality
 
     @property

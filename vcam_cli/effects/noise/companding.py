@@ -64,11 +64,11 @@ class CompandedQuantization(Quantizer):
         return np.clip(code, 0, self.highest_code, out=code).astype(electrons.dtype)
 
     def moved(self, electrons: Array, codes: Array) -> Array:
-        """Return the signal whose response is by so many codes of the ADC [DN] another one [e]."""
+        """Return the signal whose response differs by codes of the ADC [DN] from another's [e]."""
         return self.adc.moved(electrons, codes)
 
     def linear(self, dn: Array) -> Array:
-        """Return the codes of the ADC that companded ones stand for, in their float type [DN]."""
+        """Return the codes of the ADC that companded ones represent, in their float type [DN]."""
         kind = np.result_type(dn, np.float32)  # of whole numbers, floats
         return self._between(np.asarray(dn, np.float64), 1, 0).astype(kind)
 

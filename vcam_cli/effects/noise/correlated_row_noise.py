@@ -36,7 +36,7 @@ class CorrelatedRowNoise(NoiseSource):
     name = "correlated_row_noise"
     reference = "EMVA 1288 release 4.0, section 8 (row noise); Box and Jenkins 1976, section 3.2.3"
     keys_behind_light = ("pixel.readout.correlated_row_noise",)
-    absent = "pixel.readout.correlated_row_noise is none or 0"
+    absent = "pixel.readout.correlated_row_noise has the value none or 0"
     seconds_per_pixel = 1e-9
     origin = "readout"
 

@@ -39,7 +39,7 @@ class PatternShading(NoiseSource):
     name = "fpn_shading"
     reference = "EMVA 1288 release 4.0, section 8 (low frequencies of the spectrogram); own model"
     keys_behind_light = ("pixel.fpn.shading",)
-    absent = "pixel.fpn.shading is none or 0"
+    absent = "pixel.fpn.shading has the value none or 0"
     seconds_per_pixel = 6e-9
     scope = "sensor"
     sample_draws = "common"

@@ -90,7 +90,7 @@ class HeavyTailedNoise(NoiseSource):
         " CVPR 2020, section 3.2 (read noise)"
     )
     keys_behind_light = ("pixel.readout.heavy_tailed_noise",)
-    absent = "pixel.readout.heavy_tailed_noise is none or 0"
+    absent = "pixel.readout.heavy_tailed_noise has the value none or 0"
     seconds_per_pixel = 60e-9
     origin = "readout"
 

@@ -79,7 +79,7 @@ class Quantization(Quantizer):
         return electrons * (1 / self.electrons_per_dn) + self.offset
 
     def moved(self, electrons: Array, codes: Array) -> Array:
-        """Return the signal whose response is by so many codes [DN] another one [electrons]."""
+        """Return the signal whose response differs by codes [DN] from another's [electrons]."""
         codes *= codes.dtype.type(self.electrons_per_dn)
         electrons += codes
         return electrons
@@ -147,7 +147,7 @@ class LogarithmicQuantization(Quantizer):
         return level
 
     def moved(self, electrons: Array, codes: Array) -> Array:
-        """Return the signal whose response is by so many codes [DN] another one [electrons].
+        """Return the signal whose response differs by codes [DN] from another's [electrons].
 
         Where the curve has no value it stays; no signal moves by more than the whole scale.
         """
@@ -215,7 +215,7 @@ class CurvedQuantization(Quantizer):
         return level.astype(electrons.dtype)
 
     def moved(self, electrons: Array, codes: Array) -> Array:
-        """Return the signal whose response is by so many codes [DN] another one [electrons]."""
+        """Return the signal whose response differs by codes [DN] from another's [electrons]."""
         volts = self.curve.volts_of(electrons) + codes / self._codes_per_volt
         return self.curve.electrons_of(volts).astype(electrons.dtype)
 

@@ -24,7 +24,7 @@ class ResetNoise(NoiseSource):
     """Thermal noise of what is reset, or a stated number [electrons rms].
 
     What is reset is the architecture's: the photodiode, or the bit line of a passive pixel. Where
-    correlated double sampling takes the noise away there is none, stated or not.
+    correlated double sampling removes the noise, a stated one is not simulated.
     """
 
     electrons: float
@@ -33,8 +33,8 @@ class ResetNoise(NoiseSource):
     reference = "Chen 2003, section 2.2.3: kTC, sigma^2 = kTC/q^2"
     keys_behind_light = ("pixel.readout.reset_noise",)
     absent = (
-        "pixel.readout.reset_noise is none or 0, or correlated double sampling removes it"
-        " (aps-4t, ccd)"
+        "pixel.readout.reset_noise has the value none or 0, or correlated double sampling"
+        " removes it (aps-4t, ccd)"
     )
     seconds_per_pixel = 9e-9
     sample_draws = "common"
@@ -62,7 +62,7 @@ class ResetNoise(NoiseSource):
 
 
 def _noise(camera: Camera) -> float:
-    """Return the noise that the reset leaves in a frame [e rms]; 0 where there is none."""
+    """Return the noise that the reset leaves in a frame, 0 after its removal [e rms]."""
     given = camera.pixel.readout.reset_noise
     of_what = ARCHITECTURES[camera.pixel.architecture].reset_noise
     if given == "none" or of_what == "none":

@@ -36,7 +36,7 @@ class ShotNoise(NoiseSource):
 
     @classmethod
     def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
-        """Return the shot noise in the model that the file's accuracy asks for."""
+        """Return the shot noise in the model of the file's accuracy."""
         given = camera.pixel.crosstalk
         coupling = None if given is None else given.interpixel_capacitance
         coupled = 1.0

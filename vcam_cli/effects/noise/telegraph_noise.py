@@ -45,7 +45,7 @@ class TelegraphNoise(NoiseSource):
         " IEDM 2006, doi:10.1109/IEDM.2006.346973"
     )
     keys_behind_light = ("pixel.readout.telegraph_noise",)
-    absent = "pixel.readout.telegraph_noise is none or 0"
+    absent = "pixel.readout.telegraph_noise has the value none or 0"
     seconds_per_pixel = 20e-9
 
     @classmethod

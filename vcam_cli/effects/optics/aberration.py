@@ -53,7 +53,7 @@ class Aberration(AberrationBlur):
 def check(camera: Camera, geometry: Geometry) -> None:
     """Refuse a wavefront too steep to be followed as a wave.
 
-    It is refused switched off or not: the plan says of what is left out how much it would do.
+    An effect that is switched off is refused, too: the plan states the error of skipping it.
 
     Parameters
     ----------

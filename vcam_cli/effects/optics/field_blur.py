@@ -122,7 +122,7 @@ class FieldBlur(AberrationBlur, FieldTransfer):
         return tuple(Zone(kind(self.lens, terms, self.focus), weight) for terms, weight in found)
 
     def zones(self, count: int) -> tuple[Zone, ...]:
-        """Return the rings cut into sectors, in each of which the wavefront is turned."""
+        """Return the rings cut into sectors; each turns the wavefront with its azimuth."""
         if not self._azimuthal_order:
             return self.rings(count)
         # As many harmonics around as powers outwards; a multiple of 4 has its quarter turns.

@@ -24,7 +24,7 @@ LEFT, RIGHT = 1, -1
 """Side of the picture on which light of something near lands by each half of the lens, as the
 photographer sees it: rays of the left half have not crossed yet, and the picture is upright."""
 LEAST = 1e-9
-"""Radius of a blur below which there is none [m]."""
+"""Blurs of a smaller radius are skipped [m]."""
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ class LateralColor(Magnification):
 
     name = "lateral_color"
     reference = "lateral chromatic aberration: Born and Wolf, Principles of Optics, 7th ed., 4.7.3"
-    absent = "optics.lateral_color is none"
+    absent = "optics.lateral_color has the value none"
 
     @classmethod
     def from_camera(cls, camera: Camera, geometry: Geometry) -> LateralColor | None:

@@ -41,7 +41,7 @@ class OffAxis(Gain):
 
     name = "off_axis"
     reference = "Chen 2003, eq 2.22 (exact) and 2.21 (cos4)"
-    absent = "optics.off_axis is none"
+    absent = "optics.off_axis has the value none"
     origin = "lens"
     seconds_per_pixel = 2e-9
 

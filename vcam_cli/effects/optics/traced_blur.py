@@ -61,7 +61,7 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
     diffracts: bool
     longest: float
     shortest: float
-    """Range of wavelengths that it is asked for [m]."""
+    """Range of wavelengths at which it is computed [m]."""
     color: WavelengthTable
     """Magnification by wavelength, which `lateral_color` simulates."""
     angle: float = 0.0
@@ -195,7 +195,7 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
         return self._grid(wavelength, min(farthest, 2.0)).interpolate(sx, sy)
 
     def _grid(self, wavelength: float, farthest: float) -> OtfGrid:
-        """Return the OTF at a wavelength, over lags as far as any that was asked for."""
+        """Return the OTF at a wavelength, up to the longest lag requested before."""
         with self.lock:
             kept = self.kept.get(wavelength)
             if kept is None or kept.farthest < farthest:
@@ -300,7 +300,7 @@ class TracedBlur(AberrationBlur, FieldTransfer):
         )
 
     def zones(self, count: int) -> tuple[Zone, ...]:
-        """Return the rings cut into sectors, in each of which the blur is turned."""
+        """Return the rings cut into sectors; each turns the blur with its azimuth."""
         around = 4 * math.ceil((4 * (self._enough(count) - 1) + 1) / 4)
         return tuple(
             Zone(
@@ -319,7 +319,7 @@ class TracedBlur(AberrationBlur, FieldTransfer):
         return min(wanted, max(count, MOST_PLACES))
 
     def _places(self, count: int) -> tuple[PlaceBlur, ...]:
-        """Return the blur at so many places, traced once for each count."""
+        """Return the blur at `count` places, traced once for each count."""
         if count not in self._kept:
             at = (1 - np.cos(np.pi * np.arange(count) / (count - 1))) / 2
             self._kept[count] = self.at_heights(self.half_diagonal * at)

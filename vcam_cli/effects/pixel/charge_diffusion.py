@@ -45,7 +45,7 @@ class ChargeDiffusion(RadialTransfer):
 
     name = "charge_diffusion"
     reference = "Chen 2003, eqs 2.27-2.29; absorption of silicon: Green 2008"
-    absent = "pixel.photodetector.charge_diffusion is none"
+    absent = "pixel.photodetector.charge_diffusion has the value none"
     largest_loss = 1.0
 
     @classmethod

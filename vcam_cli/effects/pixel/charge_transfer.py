@@ -2,7 +2,7 @@
 
     w_k = C(n + k - 1, k) e^k (1 - e)^n
 
-is the share of a packet that arrives k packets late after n transfers, each of which leaves the
+is the share of a packet that arrives k packets late after n transfers. Each transfer leaves the
 share e behind.
 """
 

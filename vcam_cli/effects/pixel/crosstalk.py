@@ -44,7 +44,7 @@ class Crosstalk(NeighborSharing):
         " Poisson Processes, 1993, section 5.5"
     )
     keys_behind_light = ("pixel.crosstalk",)
-    absent = "pixel.crosstalk is none"
+    absent = "pixel.crosstalk has the value none"
     seconds_per_pixel = 10e-9
 
     def __post_init__(self) -> None:

@@ -35,7 +35,7 @@ class Microlens(Gain):
     reference = (
         "Chen 2003, section 3.5.4; Catrysse, Liu and El Gamal 2000, doi:10.1117/12.385460 (shift)"
     )
-    absent = "pixel.microlens is none"
+    absent = "pixel.microlens has the value none"
 
     @classmethod
     def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:

@@ -69,7 +69,7 @@ class PixelVignetting(Gain):
 
     name = "pixel_vignetting"
     reference = "Catrysse, Liu and El Gamal 2000, doi:10.1117/12.385460; Chen 2003, section 2.2.2"
-    absent = "pixel.stack is none"
+    absent = "pixel.stack has the value none"
     seconds_per_pixel = 3e-9
 
     @classmethod

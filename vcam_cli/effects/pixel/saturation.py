@@ -1,4 +1,4 @@
-"""A well holds so many electrons and no more.
+"""A well holds a limited number of electrons.
 
     electrons = min(signal + noise, full well)
 

@@ -72,7 +72,7 @@ def image_motion(exposed: ExposedMotion, geometry: Geometry) -> ImageMotion:
 class EvenMotion(ImageMotion, Motion):
     """Uniform translation of the image: sinc of frequency times the path in the exposure.
 
-    A rolling shutter moves row by row what is seen: v line_time from one row to the next.
+    A rolling shutter displaces the image row by row: v line_time from one row to the next.
     """
 
     exposed: ExposedMotion

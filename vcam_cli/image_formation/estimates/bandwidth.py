@@ -1,6 +1,6 @@
 """How finely a scene is sampled: margin, cells of a chart, highest frequency.
 
-Pixels fold every frequency that the lens passes into the picture, so what is left out is an error.
+Pixels fold every frequency that the lens passes into the picture, so a skipped one is an error.
 Each of three approximations has its share of the tolerance:
 
 - the margin beyond the array, behind which a chart is mirrored: from the tail of the line spread
@@ -38,7 +38,7 @@ CONTRAST = 0.25
 SMALLEST_MARGIN = 4
 """Pixels that a chart goes on beyond the array, at least; never more than the array."""
 MOST_MARGIN_CELLS = 4096
-"""Cells along an axis, as fine as the lens's cut-off asks for, that a margin may lead to."""
+"""Cells along an axis, as fine as the lens's cut-off requires, that a margin may lead to."""
 LARGEST_TRANSFORM = 1 << 24
 """Samples along an axis that no machine has the memory for."""
 RESOLVED = 256

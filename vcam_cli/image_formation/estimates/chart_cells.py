@@ -240,7 +240,7 @@ FOLDS = (-2, -1, 1, 2)
 
 
 def _folded(turns: Array, k: int) -> Array:
-    """Return what is left of a wave of f + k / d after the mean over cells, over that of f."""
+    """Return the contrast of a wave of f + k / d after the mean over cells, over that of f."""
     if not k:
         return np.ones_like(turns)
     # A frequency of a multiple of the cells' lies outside what is folded: its value does not count.

@@ -6,7 +6,7 @@ the photodetector a blur H takes from an edge of height 1 at u = 0
 
     e(u) = (1 - h) (B(u) - 1/2) - integral_0^F Im[(H(f) - h) A(f) exp(2 pi i f u)] / (pi f) df,
 
-B the part of the photodetector beyond the edge, A its transfer, h = H(F) what is left of H at the
+B the part of the photodetector beyond the edge, A its transfer, h = H(F) the value of H at the
 end of the integral.
 """
 
@@ -52,7 +52,7 @@ class EdgeGroup:
     pixels: Array
     """(n, m) numbers of these pixels in a strip."""
     counts: Array
-    """(strips,) how many pixels each stands for."""
+    """(strips,) number of pixels that each represents."""
 
 
 def has_straight_edges(scene: Scene) -> TypeGuard[ChartScene]:

@@ -88,7 +88,7 @@ DIRECTED = 4
 ENTRIES = 2560
 """Frequencies at which a round transfer function is known, for its tables and to judge them."""
 PLANES = 4
-"""Mixtures that stand for a scene's spectra, at most, as often as not."""
+"""Mixtures that replace a scene's spectra, at most, as often as not."""
 PARITIES, MODES = 4, 4
 """Filters of a blur with a direction, and of one that changes over the field, about."""
 FIELD = 0.16
@@ -186,7 +186,7 @@ class LightCost:
     scene: AnyScene
     """The scene, flat."""
     _images: dict[tuple[Effect, ...], float] = field(default_factory=dict)
-    """Effects that blur -> seconds of the image that they make, as far as asked for."""
+    """Effects that blur -> seconds of the image that they make, of those requested before."""
 
     def saved(self, omitted: Collection[Effect]) -> float:
         """Return the time that leaving out some effects saves.
@@ -268,7 +268,7 @@ def expected_report(
 
 
 def _sampled(path: OpticalPath, scene: SampledScene) -> SpectrumReport:
-    """Return the cells of a scene and the terms of its spectrum, as far as they are foreseen."""
+    """Return the cells of a scene and the predicted terms of its spectrum."""
     g = path.geometry
     pixels = g.rows * g.columns
     if not isinstance(scene, ChartScene):

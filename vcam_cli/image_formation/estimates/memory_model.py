@@ -118,7 +118,7 @@ def table_bytes(path: OpticalPath, planes: int, size: TableSize) -> int:
 def _values(
     path: OpticalPath, scene: SampledScene, highest: float, planes: int, series: int
 ) -> int:
-    """Numbers that a scene's spectrum takes, and so many series for the pixels.
+    """Numbers that a scene's spectrum and the given count of pixels' series take.
 
     Where folding is exact a series has as many terms as the scene has pixels, its margin included.
     """

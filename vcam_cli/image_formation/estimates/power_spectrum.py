@@ -249,7 +249,7 @@ class PowerSpectrum:
         return float(left[:, beyond].max()) if beyond < left.shape[1] else 0.0
 
     def _left_beyond(self, power: Array, pitch: tuple[float, float]) -> tuple[Array, Array]:
-        """Return frequencies (n,) [pixel Nyquist], and what is left from each on, rms (C, n).
+        """Return frequencies (n,) [pixel Nyquist], and the signal from each on, rms (C, n).
 
         Pixels cannot tell apart a term of each zone between multiples of their Nyquist frequency:
         within a zone mean squares add up, those of zones as if all of them met in phase.

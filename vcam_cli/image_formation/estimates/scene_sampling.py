@@ -1,4 +1,4 @@
-"""A scene's spectrum, and how far up the tolerance asks for it."""
+"""A scene's spectrum, and the highest frequency that the tolerance requires."""
 
 from __future__ import annotations
 

@@ -114,7 +114,7 @@ def _layer_path(path: OpticalPath, optics: LayerOptics, count: int) -> OpticalPa
     """Return the path of a layer's light, with twice the colors: those of its cover come last.
 
     Cover is seen in the light of all the picture's parts together. What layers lose is detail of
-    one picture, which adds up: of so many, each may lose a part of what all may.
+    one picture, which adds up: each layer may lose its part of the total.
     """
     behind = (e for e in of_kind(path.effects, Blur, SeparableTransfer) if not is_of_lens(e))
     effects = (*(e for e in optics.effects if is_of_lens(e)), *behind)
@@ -162,7 +162,7 @@ def _held_bytes(path: OpticalPath, scene: DepthScene) -> int:
 def _report(
     path: OpticalPath, reports: list[SpectrumReport], cut: CutReport, held: int
 ) -> SpectrumReport:
-    """Return what is known of the image of layers."""
+    """Return the report on the image of layers."""
     names = {name for own in reports for name in own.changes}
     return SpectrumReport(
         oversampling=max((own.oversampling for own in reports), default=0.0),

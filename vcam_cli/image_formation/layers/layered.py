@@ -8,7 +8,7 @@ lens makes of its light E_i a_i and its opacity a_i, each with the transfer of i
 That is exact where all rays of a pixel see the same of all layers but one. What is missing
 elsewhere, around edges, is the covariance over rays (`ray_windows.py`).
 
-Each layer's image is formed as that of any flat scene, with its opacity for so many more colors.
+Each layer's image is formed as that of any flat scene, with its opacity for as many further colors.
 """
 
 from __future__ import annotations
@@ -349,7 +349,7 @@ def _light_and_cover(
 def _share_seen(window: Window, beyond: int) -> float:
     """Return the part that a window sees of a chart and of its margin near the window.
 
-    The chart goes on so many pixels beyond; what is lost of its detail is lost close to it.
+    The chart goes on by the margin beyond; detail is lost close to it alone.
     """
     rows, columns = window.pixels
     beyond = min(beyond, BORDER)
@@ -397,7 +397,7 @@ def is_of_lens(effect: Effect) -> bool:
 
 
 def _report(layers: Sequence[SeenLayer], error: float, depth: DepthReport) -> SpectrumReport:
-    """Return what is known of the image of layers, and its error [e/s]."""
+    """Return the report on the image of layers, with its error [e/s]."""
     reports = [layer.report for layer in layers]
     names = {name for own in reports for name in own.changes}
     return SpectrumReport(
@@ -416,5 +416,5 @@ def _report(layers: Sequence[SeenLayer], error: float, depth: DepthReport) -> Sp
 
 
 def _colors(count: int) -> Mosaic:
-    """Return so many colors without names of their own."""
+    """Return `count` colors, named by their numbers."""
     return Mosaic((tuple(str(number) for number in range(count)),))

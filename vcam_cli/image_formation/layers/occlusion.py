@@ -12,10 +12,10 @@ Their covariance is missing,
 with the mean < > over rays, and K for what sharp lens, silicon and photodetector do to an image.
 
 Layers are known by their means over cells. Of such layers each ray has the exact value: it looks up
-the cells that it meets. What is left are the size of the cells and the number of rays, which
-`ray_windows.py` chooses.
+the cells that it meets. Its errors are those of the size of the cells and of the number of
+rays, which `ray_windows.py` chooses.
 
-Diffraction acts on the composed image as that of the lens in focus. A point of the pupil stands for
+Diffraction acts on the composed image as that of the lens in focus. A point of the pupil represents
 pairs of points on both sides of it [1]_, which are the closer together the nearer it lies to the
 pupil's edge; that is neglected in C, where it is little beside blurs wider than diffraction.
 
@@ -172,7 +172,7 @@ def covariance(
     seen : callable
         What lens, silicon and photodetectors make of images on the inner cells.
     compose : callable, optional
-        What puts the layers one before the other; it does not ask for the last one's opacity.
+        What puts the layers one before the other; it does not use the last one's opacity.
 
     Returns
     -------

@@ -293,7 +293,7 @@ def _mirrored(index: Array, count: int) -> Array:
 
 
 def _moved(planes: Array, x: float, y: float, reach: int) -> Array:
-    """Return the inner part of planes, displaced to the right and down by so many cells."""
+    """Return the inner part of planes, displaced by x cells to the right and y down."""
     out = planes
     for axis, by in ((1, y), (2, x)):
         start = math.floor(reach - by)

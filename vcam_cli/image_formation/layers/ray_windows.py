@@ -67,7 +67,7 @@ same."""
 
 @dataclass(frozen=True)
 class Hidden:
-    """What is known of the covariance that was added."""
+    """Cells and errors of the covariance that was added."""
 
     cells: int = 0
     """Cells along a pixel's side where they are finest; 0 where none was added."""
@@ -202,7 +202,7 @@ def _squares(one: _Sum, other: _Sum) -> float:
 def _too_coarse(sums: Sequence[_Sum], budget: float) -> list[_Sum]:
     """Return the windows to be refined for all errors together to come within a budget.
 
-    They are those that err most for what they cost, and so many that the budget is kept if the
+    They are those that err most for what they cost, and enough of them to keep the budget if the
     squares of their errors shrink as expected.
     """
     total = sum(one.error for one in sums)
@@ -231,7 +231,7 @@ def windows_with(bound: Array, allowed: float) -> tuple[list[Window], float]:
     windows : list of Window
         The windows.
     left_out : float
-        Bound on what is left out, rms over the array, in the same unit.
+        Bound on the skipped covariance, rms over the array, in the same unit.
     """
     rows, columns = bound.shape
     tops, lefts = np.arange(0, rows, SIDE), np.arange(0, columns, SIDE)

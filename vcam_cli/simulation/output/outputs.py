@@ -233,7 +233,7 @@ def write_raw(result: Photograph, path: Path) -> None:
 
 
 def _raw_jobs(result: Photograph, folder: OutputFolder) -> Iterator[Callable[[], None]]:
-    """Jobs that write the raw frame in every format that is asked for."""
+    """Jobs that write the raw frame in every requested format."""
     yield partial(write_raw, result, folder.new("raw.exr"))
     frame = result.frame
     said = config_hash(frame.camera)

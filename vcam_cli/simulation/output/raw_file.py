@@ -33,7 +33,7 @@ from vcam_cli.simulation.frame import Frame
 
 ROWS_AT_ONCE = 4 * BLOCK_ROWS
 CURVE_STEP = 64
-"""Of the points of a transfer curve, every so many are written."""
+"""Of the points of a transfer curve, one in this many is written."""
 
 UNITS = {"dn": "DN", "electrons": "e", "volts": "V"}
 """Unit of each channel of raw.exr."""

@@ -125,7 +125,7 @@ def draw_snr(figure: Any, frame: Frame) -> None:
         snr = 20 * np.log10(signal / np.sqrt(np.maximum(variance, 1e-300)))
         axes.plot(signal, snr, label=label, color=color, ls=dashes, lw=1.3)
     axes.set(xscale="log", xlim=(1, signal[-1]))
-    axes.set(xlabel="signal of a pixel [e]", ylabel="signal over noise [dB]")
+    axes.set(xlabel="signal of a pixel [e]", ylabel="SNR [dB]")
     mark_scene(axes, frame)
     axes.legend(fontsize=7.5, loc="upper left")
 
@@ -242,7 +242,7 @@ def draw_mtf(figure: Any, frame: Frame, names: Sequence[str]) -> None:
     axes.plot(frequency / 1e3, whole, label="all together", color="#777777", lw=2)
     axes.axvline(frequency[-1] / 2e3, color="#777777", lw=0.9, ls=(0, (1, 2)))
     axes.text(frequency[-1] / 2e3, 1.02, " Nyquist", fontsize=7.5, va="bottom", ha="center")
-    axes.set(xlabel="spatial frequency on the sensor [lp/mm]", ylabel="transfer of contrast")
+    axes.set(xlabel="spatial frequency on the sensor [lp/mm]", ylabel="MTF")
     axes.set(xlim=(0, frequency[-1] / 1e3), ylim=(0, 1.1))
     axes.legend(fontsize=7.5)
 

@@ -215,7 +215,7 @@ def _noise(frame: Frame) -> Iterator[Part]:
         "Share of each source in the variance of a pixel. The gray bar: signals of this scene.",
     )
     yield Picture(
-        "Signal over noise",
+        "SNR",
         pictures.drawing(partial(report_plots.draw_snr, frame=frame), (5, 3.5)),
         "Signal-to-noise ratio over the signal, temporal and with fixed pattern, below the"
         " shot-noise limit",
@@ -244,8 +244,7 @@ def _light(frame: Frame) -> Iterator[Part]:
         yield Picture(
             "Sharpness by factor",
             pictures.drawing(partial(report_plots.draw_mtf, frame=frame, names=names), (5.2, 4)),
-            f"Transfer of contrast over spatial frequency of {', '.join(names)}, and of all"
-            " together",
+            f"MTF over spatial frequency of {', '.join(names)}, and of all together",
             "Transfer along a row, averaged over the light of the scene.",
         )
 
