@@ -69,3 +69,4 @@ DRAFT = Settings(20e-9, 2049, 2e-3, 3, 4, 32, coarse_normals=True)
 STANDARD = Settings(10e-9, 2049, 5e-4, 4, 8, 32)
 FINE = Settings(10e-9, 4097, 2e-4, 5, 10, 32)
 REFERENCE = Settings(2.5e-9, 32769, 2e-5, 6, 16, 64, far_cells=32)
+"""Settings by tolerance (`solve.settings.LADDER`), each number measured alone: see above."""

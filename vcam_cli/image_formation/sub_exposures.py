@@ -50,12 +50,14 @@ that; over all places in the mean it is 0.7 of that midway."""
 PER_WAVE, MOST_FOR_WAVES = 6, 48
 """Fine places in a period of a scene's own wave: the splines then err by 1e-4 of it."""
 FEWEST_INSTANTS, MOST_INSTANTS = 4, 2048
+"""Instants, at least and at most: where the most err more, the predicted error includes it."""
 GROWTH = 1.5
 """Places over those tried before, and instants over those that they are compared with."""
 PROBES = 12
-"""Rows of the array at which instants are compared."""
+"""Rows of the array, about, at which instants are compared: their rms difference is the predicted
+error of the instants."""
 LINES = 192
-"""Rows of the fine image at which places are compared."""
+"""Lines of the fine image along each axis, about, at which the error of places is measured."""
 
 FormImage = Callable[[OpticalPath, Scene], tuple[Layers, SpectrumReport]]
 

@@ -54,6 +54,7 @@ from vcam_cli.scenes.waves import WaveScene
 GROUPS_SHARE = 0.15
 """Part of the tolerance that light between the wavelengths of the groups may err."""
 MOST_GROUPS = 24
+"""Wavelengths at which a chart is warped, at most: each takes an image of its own."""
 CELLS_SHARE = 0.4
 """Part of the tolerance by which the skew of what cells see may be missed, in full contrast."""
 DETAIL = 0.2

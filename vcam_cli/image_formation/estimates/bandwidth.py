@@ -42,7 +42,8 @@ MOST_MARGIN_CELLS = 4096
 LARGEST_TRANSFORM = 1 << 24
 """Samples along an axis that no machine has the memory for."""
 RESOLVED = 256
-"""Periods of the highest frequency within which the tail of a line is integrated."""
+"""Periods of the highest frequency within which the tail of a line is integrated; farther away it
+is that of a cusp: see `line_spread_tail`."""
 LOWEST = 0.02
 """Lowest frequency at which a spectrum may end [pixel Nyquist]."""
 HIGHEST = 64.0

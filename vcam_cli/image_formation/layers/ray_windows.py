@@ -49,7 +49,8 @@ alike; each level errs half as much as the one before. The first two are enough 
 seven layers of leaves or rectangles. Cells of two pixels and of one would both miss detail within
 pixels, and agree."""
 MOST_VALUES = 1 << 33
-"""Values that rays look up in a window, at most."""
+"""Values that rays look up in a window, at most: the predicted error includes that of windows which
+need more."""
 SIDE, LONGEST = 16, 16
 """Side of a tile [pixels], and tiles along either side of a window, at most."""
 SHRINK = 0.25
