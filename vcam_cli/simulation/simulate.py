@@ -41,9 +41,9 @@ class Result(Photograph):
         Raises
         ------
         BadInput
-            For a folder that cannot be written.
+            Where something else has the folder's name.
         CannotDo
-            Where memory or a library is missing.
+            Where a file cannot be written, or memory does not suffice.
         TypeError
             For what is no path.
         """

@@ -54,6 +54,13 @@ def save(result: Photograph, out: Path) -> Path:
     -------
     Path
         The folder.
+
+    Raises
+    ------
+    BadInput
+        Where something else has the folder's name.
+    CannotDo
+        Where a file cannot be written.
     """
     inputs = provenance.inputs(result.frame.camera)
     start = time.perf_counter()
@@ -84,6 +91,11 @@ def finish(
     -------
     dict
         Contents of `run.json`.
+
+    Raises
+    ------
+    CannotDo
+        Where a file cannot be written.
     """
     if result.frame.solved.output.report:
         from vcam_cli.simulation.output import run_report
@@ -104,6 +116,11 @@ def write(result: Photograph, folder: OutputFolder) -> None:
         Photograph to write.
     folder : OutputFolder
         Folder of the run.
+
+    Raises
+    ------
+    CannotDo
+        Where a file cannot be written.
     """
     camera = result.frame.solved
     with ThreadPool(2) as pool:
@@ -159,6 +176,11 @@ def write_render(result: Photograph, path: Path, render: Array) -> None:
         File to write.
     render : Array
         Picture (h, w) or (h, w, 3), 8 or 16 bits.
+
+    Raises
+    ------
+    CannotDo
+        Where the file cannot be written.
     """
     taken = raw_file.photograph(result.frame)
     write_png(path, render, "; ".join(f"{name} {value}" for name, value in taken.items()))
@@ -228,6 +250,11 @@ def write_raw(result: Photograph, path: Path) -> None:
         Photograph to write.
     path : Path
         File to write.
+
+    Raises
+    ------
+    CannotDo
+        Where the file cannot be written.
     """
     raw_file.write_raw(path, result.frame, config_hash(result.frame.camera))
 

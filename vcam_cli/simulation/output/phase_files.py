@@ -30,6 +30,11 @@ def write_phase(path: Path, frame: Frame, config_hash: str) -> None:
         Frame that was taken.
     config_hash : str
         SHA-256 of the resolved camera.
+
+    Raises
+    ------
+    CannotDo
+        Where the file cannot be written.
     """
     assert frame.phase_dn is not None
     left, right = frame.phase_dn
@@ -89,6 +94,11 @@ def write_disparity(path: Path, frame: Frame) -> None:
         File to write.
     frame : Frame
         Frame that was taken.
+
+    Raises
+    ------
+    CannotDo
+        Where the file cannot be written.
     """
     found = frame_disparity(frame)
     known = found[np.isfinite(found)]

@@ -110,6 +110,11 @@ def write_raw_dng(path: Path, frame: Frame, description: str) -> None:
         Frame that was taken.
     description : str
         Text for the tag ImageDescription.
+
+    Raises
+    ------
+    CannotDo
+        Where the file cannot be written.
     """
     codes = np.moveaxis(frame.dn, 0, -1) if frame.layout.full_color else frame.dn
     levels = np.array([frame.black_dn, frame.chain.saturated_dn, frame.white_dn.max()])

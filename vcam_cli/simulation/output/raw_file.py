@@ -53,6 +53,11 @@ def write_raw(path: Path, frame: Frame, config_hash: str) -> None:
         Frame that was taken.
     config_hash : str
         SHA-256 of the resolved camera.
+
+    Raises
+    ------
+    CannotDo
+        Where the file cannot be written.
     """
     values: Values = {
         "dn": (frame.dn, None),
@@ -82,6 +87,11 @@ def write_raw_tiff(path: Path, frame: Frame, config_hash: str) -> None:
         Frame that was taken.
     config_hash : str
         SHA-256 of the resolved camera.
+
+    Raises
+    ------
+    CannotDo
+        Where the file cannot be written.
     """
     codes = tiff.whole_numbers(frame.dn, white_level(frame))
     if frame.layout.full_color:
@@ -120,6 +130,11 @@ def write_hdr(path: Path, frame: Frame, config_hash: str) -> None:
         Frame that was taken.
     config_hash : str
         SHA-256 of the resolved camera.
+
+    Raises
+    ------
+    CannotDo
+        Where the file cannot be written.
     """
     assert frame.photocurrent is not None
     said: dict[str, Attribute] = {

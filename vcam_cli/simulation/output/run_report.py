@@ -43,7 +43,7 @@ def write(path: Path, result: Photograph, record: Mapping[str, Any]) -> None:
     Raises
     ------
     CannotDo
-        Where matplotlib is not installed.
+        Where the file cannot be written.
     """
     page.write(path, report(result, record))
 
