@@ -862,7 +862,18 @@ class Overflow(Effect):
 
     @abstractmethod
     def settled(self, charge: Array) -> Array:
-        """Return charges (rows, columns) after their excess has found room [electrons]."""
+        """Return charges after their excess has found room.
+
+        Parameters
+        ----------
+        charge : Array
+            Charges (rows, columns) [electrons].
+
+        Returns
+        -------
+        Array
+            Charges (rows, columns) [electrons].
+        """
 
 
 class Charge(Effect):

@@ -102,7 +102,18 @@ class Site:
         return self.lines_drawn[name]
 
     def uniform_columns(self, name: str) -> Array:
-        """Return one number of 0 to 1 a column, the same for every block and float type."""
+        """Return one uniform number a column, the same for every block and float type.
+
+        Parameters
+        ----------
+        name : str
+            Name of the stream.
+
+        Returns
+        -------
+        Array
+            Numbers (columns,) from 0 to 1, without unit.
+        """
         if name not in self.lines_drawn:
             drawn = self.line_stream(name).random(self.columns)
             drawn.setflags(write=False)
@@ -110,7 +121,18 @@ class Site:
         return self.lines_drawn[name]
 
     def uniform_rows(self, name: str) -> Array:
-        """Return one number of 0 to 1 a row (rows, 1), the same for every float type."""
+        """Return one uniform number a row, the same for every float type.
+
+        Parameters
+        ----------
+        name : str
+            Name of the stream.
+
+        Returns
+        -------
+        Array
+            Numbers (rows, 1) from 0 to 1, without unit.
+        """
         if name not in self.lines_drawn:
             drawn = self.line_stream(name).random(self.all_rows)
             drawn.setflags(write=False)
