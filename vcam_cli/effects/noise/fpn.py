@@ -34,7 +34,7 @@ class FixedPattern(NoiseSource):
     With them dark currents: a pixel's is the mean one times 1 + `dark` z, and never below zero; it
     makes shot noise of its own. And pixels that do not work: a hot one leaks so much that it reads
     the full well whatever the light is (the clip comes last, and takes the readout noise with it),
-    or has a dark current so many times the mean one, distributed exponentially, whose shot noise is
+    or has a dark current above the mean one by a factor, distributed exponentially, whose noise is
     drawn, but not in the stated temporal variance; a dead one, and those of a bad column or row,
     collects nothing, and reads offset and readout noise. Which pixels these are does
     not depend on the float type, and a larger fraction has the pixels of a smaller one.
