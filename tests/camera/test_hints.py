@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from every import every
 
 from vcam_cli.camera import hint_tables, hints
 from vcam_cli.camera.load import load
@@ -202,19 +203,21 @@ def remedy_of(guess):
     return problem.remedy, guess.partition("=")[0]
 
 
-@pytest.mark.parametrize(("guess", "meant"), GUESSES.items())
-def test_a_guess_is_led_to_what_is_meant(guess, meant):
-    remedy, _ = remedy_of(guess)
-    path, _, value = meant.partition(": ")
-    if path != guess.partition("=")[0]:
-        assert path.removeprefix("scene.") in remedy, remedy
-    asked = value.removeprefix("300 ").removeprefix("20 ") if "did you mean" in remedy else value
-    assert asked in remedy, remedy
+def test_a_guess_is_led_to_what_is_meant():
+    def check(guess, meant):
+        remedy, _ = remedy_of(guess)
+        path, _, value = meant.partition(": ")
+        if path != guess.partition("=")[0]:
+            assert path.removeprefix("scene.") in remedy, remedy
+        is_asked = "did you mean" in remedy
+        asked = value.removeprefix("300 ").removeprefix("20 ") if is_asked else value
+        assert asked in remedy, remedy
+
+    every(GUESSES.items(), check)
 
 
-@pytest.mark.parametrize("meant", sorted(set(GUESSES.values())))
-def test_what_is_meant_is_right(meant):
-    assert accepted(meant)
+def test_what_is_meant_is_right():
+    every(sorted(set(GUESSES.values())), accept)
 
 
 @pytest.mark.parametrize(
@@ -253,8 +256,8 @@ def test_a_far_word_is_not_led_astray():
     assert "write one of the allowed keys" in remedy
 
 
-def accepted(entry):
-    """Whether a camera of that shipped camera takes entries "path: value and path: value"."""
+def accept(entry):
+    """Load a camera with entries "path: value and path: value"."""
     for one in re.split(" and (?=[a-z]+[.:])", entry):
         path, _, value = one.partition(": ")
         if path == "optics.prescription":  # of a camera whose lens is traced, and a file that ships
@@ -262,7 +265,6 @@ def accepted(entry):
             continue
         ccd = ["pixel.architecture=ccd"] if "charge_transfer" in path else []
         load_with(*ccd, f"{path}={value}")
-    return True
 
 
 def load_with(*sets):
@@ -271,30 +273,20 @@ def load_with(*sets):
     return load("camera.yaml", [*([STEPS] if named else []), *sets])
 
 
-@pytest.mark.parametrize(
-    "entry",
-    sorted(
-        {
-            *hint_tables.KEYS.values(),
-            *(e for words in hint_tables.ELSEWHERE.values() for e in words.values()),
-        }
-    ),
-)
-def test_every_key_that_is_named_exists_and_takes_its_value(entry):
-    assert accepted(entry)
+def test_every_key_that_is_named_exists_and_takes_its_value():
+    elsewhere = (e for words in hint_tables.ELSEWHERE.values() for e in words.values())
+    every(sorted({*hint_tables.KEYS.values(), *elsewhere}), accept)
 
 
-@pytest.mark.parametrize(
-    ("path", "value"),
-    sorted(
-        {(path, value) for path, words in hint_tables.VALUES.items() for value in words.values()}
-    ),
-)
-def test_every_value_that_is_named_is_taken(path, value):
-    if path == "scene.source.chart":  # some charts need more keys
-        assert value in CHARTS
-    else:
-        load_with(f"{path}={value}")
+def test_every_value_that_is_named_is_taken():
+    def check(path, value):
+        if path == "scene.source.chart":  # some charts need more keys
+            assert value in CHARTS
+        else:
+            load_with(f"{path}={value}")
+
+    tables = hint_tables.VALUES.items()
+    every(sorted({(path, value) for path, words in tables for value in words.values()}), check)
 
 
 def test_a_mosaic_by_its_letters():

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import pytest
 from camera_trees import REQUIRED, camera, changed, mistakes
+from every import every
 from hypothesis import given
 from hypothesis import strategies as st
 from making import GONE
@@ -47,34 +48,40 @@ class TestEveryKey:
         assert {"Camera", "Technology", "Scene", "Csf", "Readout"} <= {m.__name__ for m in models()}
         assert len(KEYS) > 150
 
-    @pytest.mark.parametrize(("model", "name"), KEYS, ids=lambda v: getattr(v, "__name__", v))
-    def test_has_a_description_a_unit_and_an_example(self, model, name):
-        field = model.model_fields[name]
-        assert field.description
-        assert len(field.description) > 1
-        assert field.examples
-        assert isinstance(field.json_schema_extra, dict)
-        assert "unit" in field.json_schema_extra
+    def test_has_a_description_a_unit_and_an_example(self):
+        def check(model, name):
+            field = model.model_fields[name]
+            assert field.description
+            assert len(field.description) > 1
+            assert field.examples
+            assert isinstance(field.json_schema_extra, dict)
+            assert "unit" in field.json_schema_extra
 
-    @pytest.mark.parametrize(("model", "name"), KEYS, ids=lambda v: getattr(v, "__name__", v))
-    def test_has_the_unit_of_its_quantity(self, model, name):
-        field = model.model_fields[name]
-        unit = field.json_schema_extra["unit"]
-        for mark in field.metadata:
-            if isinstance(mark, Quantity):
-                assert unit in DIMENSIONS[mark.dimension].units
+        every(KEYS, check)
 
-    @pytest.mark.parametrize(("model", "name"), KEYS, ids=lambda v: getattr(v, "__name__", v))
-    def test_takes_its_own_example(self, model, name):
-        field = model.model_fields[name]
-        if issubclass(model, CameraModel) and field.is_required():
-            return  # a section; its example is abridged
-        if name == "photodetector":
-            return
-        annotated = field.annotation
-        for mark in field.metadata:
-            annotated = Annotated[annotated, mark]
-        TypeAdapter(annotated).validate_python(field.examples[0])
+    def test_has_the_unit_of_its_quantity(self):
+        def check(model, name):
+            field = model.model_fields[name]
+            unit = field.json_schema_extra["unit"]
+            for mark in field.metadata:
+                if isinstance(mark, Quantity):
+                    assert unit in DIMENSIONS[mark.dimension].units
+
+        every(KEYS, check)
+
+    def test_takes_its_own_example(self):
+        def check(model, name):
+            field = model.model_fields[name]
+            if issubclass(model, CameraModel) and field.is_required():
+                return  # a section; its example is abridged
+            if name == "photodetector":
+                return
+            annotated = field.annotation
+            for mark in field.metadata:
+                annotated = Annotated[annotated, mark]
+            TypeAdapter(annotated).validate_python(field.examples[0])
+
+        every(KEYS, check)
 
 
 class TestRequired:

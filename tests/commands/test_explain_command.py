@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from every import every
 from typer.testing import CliRunner
 
 from vcam_cli import load, simulate
@@ -28,20 +29,24 @@ def test_every_name_has_an_explanation():
         assert all(len(entry["about"]) > 5 for entry in found), name
 
 
-@pytest.mark.parametrize("key", hints.index(), ids=lambda key: key.dotted)
-def test_a_key_is_told_with_unit_default_and_example(key):
-    entry = next(e for e in explain.explanations(key.dotted) if e.get("in") == "camera file")
-    assert entry["title"].startswith(key.dotted)
-    assert key.unit in entry["title"]
-    assert key.example in entry["example"]
-    assert entry["default"]
+def test_a_key_is_told_with_unit_default_and_example():
+    def check(key):
+        entry = next(e for e in explain.explanations(key.dotted) if e.get("in") == "camera file")
+        assert entry["title"].startswith(key.dotted)
+        assert key.unit in entry["title"]
+        assert key.example in entry["example"]
+        assert entry["default"]
+
+    every([(key,) for key in hints.index()], check)
 
 
-@pytest.mark.parametrize("effect", ORDER, ids=lambda effect: effect.name)
-def test_an_effect_is_told_with_its_source_and_switch(effect):
-    said = vcam(effect.name).stdout.replace("\n    ", " ")
-    assert effect.reference in said
-    assert f"effects: {{{effect.name}: off}}" in said
+def test_an_effect_is_told_with_its_source_and_switch():
+    def check(effect):
+        said = vcam(effect.name).stdout.replace("\n    ", " ")
+        assert effect.reference in said
+        assert f"effects: {{{effect.name}: off}}" in said
+
+    every(ORDER, check)
 
 
 def test_a_key_leads_to_no_effect_that_only_speaks_of_its_section():

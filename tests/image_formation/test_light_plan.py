@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from every import every
 from making import camera, radiance_for
 from optical_paths import of_camera, rms
 
@@ -127,12 +128,11 @@ def _rate(tmp_path, changes, off=None) -> np.ndarray:
 LENS = {"optics.f_number": 1.4, "pixel.width": "7.7 um", "pixel.photodetector.fill_factor": 1}
 
 
-@pytest.mark.parametrize("accuracy", ["draft", "standard", "reference"])
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize(("samples", "pixels"), [(1, 48), (3, 16), (4, 25), (1, 15)])
 @pytest.mark.parametrize("kind", ["star", "row", "column"])
-def test_lone_light_is_seen_wherever_it_is(kind, samples, pixels, seed, accuracy, tmp_path):
-    """One sample, row or column that is lit: with the plan as with all effects."""
+def test_lone_light_is_seen_wherever_it_is(kind, samples, pixels, seed, tmp_path):
+    """One sample, row or column that is lit: with every plan as with all effects."""
     size = samples * pixels
     rng = np.random.default_rng([seed, size])
     row, column = rng.integers(0, size, 2) if seed else (size - 1, size - 1)
@@ -143,10 +143,14 @@ def test_lone_light_is_seen_wherever_it_is(kind, samples, pixels, seed, accuracy
     write_png(tmp_path / "lone.png", codes)
     source = {"kind": "image", "file": str(tmp_path / "lone.png"), "model": "reflectance"}
     changes = LENS | {"array.rows": pixels, "array.columns": pixels, "scene.source": source}
-    made = camera(tmp_path, changes | {"effects": "auto", "accuracy": accuracy})
-    found = prepare(made, 1)[0]
     truth = _rate(tmp_path, changes)
-    assert rms(found.rate, truth) <= found.settings.tolerance * truth.max()
+
+    def check(accuracy):
+        made = camera(tmp_path, changes | {"effects": "auto", "accuracy": accuracy})
+        found = prepare(made, 1)[0]
+        assert rms(found.rate, truth) <= found.settings.tolerance * truth.max()
+
+    every(["draft", "standard", "reference"], check)
 
 
 def test_the_set_that_saves_most_is_left_out(tmp_path, monkeypatch):
