@@ -12,7 +12,7 @@ import io
 import json
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -40,12 +40,18 @@ def cells(path: Path) -> list[Cell]:
     return [Cell(each["cell_type"], "".join(each["source"])) for each in found]
 
 
-def run(path: Path) -> tuple[list[Cell], dict[str, Any]]:
-    """Return the cells of a notebook, run in an empty folder, and the variables at their end."""
+def run(path: Path, instead: Mapping[str, str] | None = None) -> tuple[list[Cell], dict[str, Any]]:
+    """Return the cells of a notebook, run in an empty folder, and the variables at their end.
+
+    `instead` replaces texts of its code, each of which stands in one place.
+    """
     import matplotlib
 
     matplotlib.use("agg")
     found, names, here = cells(path), {"__name__": "__main__"}, Path.cwd()
+    for text, other in (instead or {}).items():
+        (cell,) = (cell for cell in found if cell.kind == "code" and text in cell.text)
+        cell.text = cell.text.replace(text, other)
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         try:

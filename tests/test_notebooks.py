@@ -30,15 +30,23 @@ def test_the_photon_transfer_curve_has_the_gain_of_the_file():
     assert "<Result starter: 240 x 360 pixels" in cells[1].printed
 
 
-def test_pixels_have_a_best_size_though_snr_only_rises():
-    names = notebooks.run(PATHS["pixel-size"])[1]
+FEW_SIZES = {"np.linspace(5.5, 12, 10)": "np.array([5.5, 8, 12])"}
+
+
+@pytest.mark.parametrize("instead", [FEW_SIZES, pytest.param({}, marks=pytest.mark.long)])
+def test_pixels_have_a_best_size_though_snr_only_rises(instead):
+    names = notebooks.run(PATHS["pixel-size"], instead)[1]
     assert names["sizes"][0] < names["best"] < names["sizes"][-1]
     assert (np.diff(names["snrs"]) > 0).all()
 
 
-def test_a_fit_finds_the_hidden_sensor():
+FEWER_PIXELS = {'"rows": 96, "columns": 96': '"rows": 64, "columns": 64'}
+
+
+@pytest.mark.parametrize("instead", [FEWER_PIXELS, pytest.param({}, marks=pytest.mark.long)])
+def test_a_fit_finds_the_hidden_sensor(instead):
     """Within twice the half of 90 % intervals, 3.3 standard errors; predictions within 0.5 %."""
-    names = notebooks.run(PATHS["fit"])[1]
+    names = notebooks.run(PATHS["fit"], instead)[1]
     found = {p.name: p for p in names["found"].parameters}
     truth = {"black_level": 64, "read_noise": 5, "offset_pixel": 2, "gain_pixel": 0.005}
     truth |= {"full_well": 20_000, "system_gain": (4095 - 64) / 24_000}

@@ -95,22 +95,18 @@ def test_every_option_that_is_told_exists():
             assert re.search(rf"(^|[\s,]){re.escape(option)}\b", help_text), (command, option)
 
 
-@pytest.fixture(scope="module")
-def table():
-    return doc_figures.table()
+def test_the_hard_cases_err_as_the_table_says(tmp_path, monkeypatch):
+    """The same names; errors, which differ between processors, within a factor of 10.
 
-
-def test_the_hard_cases_err_as_the_table_says(table):
-    """The same names; errors, which differ between processors, within a factor of 10."""
+    And the table is renewed between its marks.
+    """
+    table = doc_figures.table()
     shown = {name: errors for name, *errors in CASE.findall(README)}
     found = {name: errors for name, *errors in CASE.findall(table)}
     assert list(shown) == list(found) == list(doc_figures.SHOWN.values())
     for name in shown:
         for said, true in zip(map(float, shown[name]), map(float, found[name]), strict=True):
             assert said == true or 0.1 <= said / max(true, 1e-99) <= 10, name
-
-
-def test_the_table_of_hard_cases_is_renewed_between_its_marks(tmp_path, table, monkeypatch):
     monkeypatch.setattr(doc_figures, "table", lambda: table)
     copy = tmp_path / "README.md"
     copy.write_text(CASE.sub("| a | 1 | 1 |", README), encoding="utf-8")

@@ -87,12 +87,15 @@ def test_the_irradiance_behind_a_lens_can_be_laid_on_a_bare_sensor(tmp_path):
     """
     detector = {"fill_factor": 1, "quantum_efficiency": {"table": {380: 0.1, 780: 0.6}}}
     lamp = {"scene.illuminant": "A", "pixel.photodetector": detector, "optics.off_axis": "exact"}
+    small = {"array.rows": 24, "array.columns": 32}
     chart = {"scene.source": {"kind": "chart", "chart": "colorchecker"}}
-    lens = camera(tmp_path, lamp | chart | {"output": {"irradiance": True, "render": "none"}})
+    lens = camera(
+        tmp_path, small | lamp | chart | {"output": {"irradiance": True, "render": "none"}}
+    )
     seen = simulate(lens)
     seen.save(tmp_path / "lens")
     source = {"kind": "hyperspectral", "file": "lens/irradiance.exr"}
-    bare = {**BARE, "scene.source": source, "scene.illuminant": GONE}
+    bare = {**BARE, **small, "scene.source": source, "scene.illuminant": GONE}
     made = camera(
         tmp_path, bare | {"scene.irradiance": "from-file", "pixel.photodetector": detector}
     )

@@ -20,9 +20,9 @@ CHARTS = {
 WELL = 100e3
 LIT = {
     "scene.illuminant": "D65", "array.pattern": "bayer-rggb", "effects": "auto",
-    "accuracy": "standard", "array.rows": 32, "array.columns": 40, "optics.off_axis": "exact",
+    "accuracy": "standard", "array.rows": 16, "array.columns": 20, "optics.off_axis": "exact",
     "pixel.photodetector.quantum_efficiency": "front-illuminated-qe",
-    "optics.transmittance": "ir-cut-650", "optics.focal_length": "0.4 mm",
+    "optics.transmittance": "ir-cut-650", "optics.focal_length": "0.2 mm",
 }  # fmt: skip
 LIGHT = {"diffraction", "pixel_aperture", "off_axis"}
 """Effects on the light."""

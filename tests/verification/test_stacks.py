@@ -31,6 +31,13 @@ def taken(tmp_path_factory):
     return camera, folder, planted.bench(camera, folder, 3, FEW)
 
 
+@pytest.fixture(scope="module")
+def right(taken):
+    """What is judged of the right file."""
+    camera, _, file = taken
+    return planted.judged(camera, {}, file)
+
+
 def named(frames, highest=4095):
     return {quantity.name: quantity.value for quantity in quantities(frames, highest)}
 
@@ -108,19 +115,16 @@ def test_frames_of_one_sensor_have_their_pattern_in_common():
     assert found.judged.deviation == pytest.approx(2.0, rel=0.3)
 
 
-def test_it_is_said_what_would_have_been_found(taken):
-    camera, _, file = taken
-    least = planted.judged(camera, {}, file).least_errors
+def test_it_is_said_what_would_have_been_found(right):
+    least = right.least_errors
     assert any(name.startswith("temporal variance of pixels") for name in least)
     assert all(0.002 < value < 0.5 for value in least.values())
 
 
-def test_a_right_file_agrees(taken):
-    camera, _, file = taken
-    found = planted.judged(camera, {}, file)
-    assert [row for row in found.judged if row.differs] == []
-    assert {row.frame for row in found.judged} == {*FEW, "all frames"}
-    assert found.summary()["differing"] == 0
+def test_a_right_file_agrees(right):
+    assert [row for row in right.judged if row.differs] == []
+    assert {row.frame for row in right.judged} == {*FEW, "all frames"}
+    assert right.summary()["differing"] == 0
 
 
 @pytest.mark.parametrize("what", QUICK)
