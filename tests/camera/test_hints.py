@@ -7,10 +7,12 @@ from pathlib import Path
 
 import pytest
 from every import every
+from typer.testing import CliRunner
 
 from vcam_cli.camera import hint_tables, hints
 from vcam_cli.camera.load import load
 from vcam_cli.camera.scene.sources import CHARTS
+from vcam_cli.commands.main import app
 from vcam_cli.errors import BadInput
 
 BASE = """
@@ -344,11 +346,17 @@ def test_a_step_of_processing_is_named_as_one():
 def test_an_option_that_is_a_key_is_led_to_set(option, meant):
     """And what it is led to is taken."""
     path, _, value = meant.partition("=")
-    line = [sys.executable, "-m", "vcam_cli.commands.main", "run", "camera.yaml", option, "1"]
-    done = subprocess.run(line, capture_output=True, text=True)
-    assert done.returncode == 2
+    done = CliRunner().invoke(app, ["run", "camera.yaml", option, "1"], prog_name="vcam")
+    assert done.exit_code == 2
     assert f'--set {path}="{value}"' in done.stderr
     load("camera.yaml", [meant])
+
+
+def test_it_is_led_there_in_a_process_of_its_own():
+    line = [sys.executable, "-m", "vcam_cli.commands.main", "run", "camera.yaml", "--iso", "1"]
+    done = subprocess.run(line, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert '--set exposure.iso="800"' in done.stderr
 
 
 def test_a_field_of_view_of_no_side_is_told_that_it_is_the_diagonals():
