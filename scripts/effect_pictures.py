@@ -85,6 +85,11 @@ EXAMPLES = {
         (*_chart("siemens-star"), *GRAY, "scene.camera_motion={jitter: 1 px}"),
         "Pointing that jitters by a pixel rms.",
     ),
+    "low_pass": Example(
+        (*_chart("siemens-star"), "optics.f_number=2", "optics.low_pass={displacement: 4 um}"),
+        "Four copies of the image, displaced by a pixel: fine spokes lose their contrast, and with"
+        " it their false colors.",
+    ),
     "pixel_aperture": Example(
         (
             *_chart("siemens-star"),

@@ -138,7 +138,7 @@ def test_the_benchmark_camera():
 def test_everything_has_every_effect_of_its_architecture():
     """But for what a CCD has, depth, which is of a scene, and what its read noise includes.
 
-    Its lens does not distort, its pixels have no crosstalk, and a drain takes all excess charge:
+    Its lens does not distort and has no low-pass filter, its pixels have no crosstalk, and a drain takes all excess charge:
     the figures of README are of that. Its pan has the motion.
     """
     camera = load("everything")
@@ -146,7 +146,7 @@ def test_everything_has_every_effect_of_its_architecture():
     missing = {name for name, effect in described.items() if effect is None}
     assert missing == {
         *("charge_transfer", "reset_noise", "depth", "adc_noise", "distortion", "lateral_color"),
-        *("crosstalk", "jitter", "blooming"),
+        *("crosstalk", "jitter", "blooming", "low_pass"),
     }
     assert camera.effects == "auto"
 

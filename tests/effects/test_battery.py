@@ -88,6 +88,11 @@ CASES: dict[str, Case] = {
         {"scene.camera_motion": {"jitter": "0 px"}},
         {"scene.source": WAVE},
     ),
+    "low_pass": Case(
+        {"optics.low_pass": {"displacement": "3 um"}},
+        {"optics.low_pass": {"displacement": "0 um"}},
+        {"scene.source": WAVE},
+    ),
     "pixel_aperture": Case({}, None, {"scene.source": WAVE}),
     "charge_diffusion": Case(
         {

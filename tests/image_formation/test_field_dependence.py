@@ -8,6 +8,7 @@ from optical_paths import PITCH, aperture, light, of_picture, path, rms, sensor,
 
 from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.effects.optics.field_blur import FieldBlur
+from vcam_cli.effects.optics.low_pass import LowPassAlongAxes, ObliqueLowPass
 from vcam_cli.effects.optics.wavefront_blur import DirectedBlur, Lens
 from vcam_cli.image_formation.settings import DRAFT, REFERENCE, STANDARD
 
@@ -19,8 +20,13 @@ STEEP = ((0.0, ()), (1.0, ((8, 260e-9), (4, 200e-9))))
 """From 8 waves a pupil radius on a grid of the pupil is computed."""
 
 
-def by_own_wavefronts(picture: np.ndarray, g, field: FieldBlur, lens: Diffraction) -> np.ndarray:
-    """Pixels (rows, columns) of a mirrored picture: a Fourier series for each of them."""
+def by_own_wavefronts(
+    picture: np.ndarray, g, field: FieldBlur, lens: Diffraction, copies=((0.0, 0.0),)
+) -> np.ndarray:
+    """Pixels (rows, columns) of a mirrored picture: a Fourier series for each of them.
+
+    Their light is the mean over `copies` of the image, displaced along x and y [m].
+    """
     twice = np.concatenate([picture, picture[::-1]])
     twice = np.concatenate([twice, twice[:, ::-1]], axis=1)
     coefficients = np.fft.fft2(twice) / twice.size
@@ -30,6 +36,8 @@ def by_own_wavefronts(picture: np.ndarray, g, field: FieldBlur, lens: Diffractio
     series = coefficients[np.ix_(k % twice.shape[0], k % twice.shape[1])]
     series = series * np.outer(np.sinc(fy * PITCH), np.sinc(fx * PITCH))  # samples are squares
     series = series * np.outer(aperture(g).along_y(fy), aperture(g).along_x(fx))
+    moved = [np.exp(-2j * np.pi * (fx * dx + fy[:, None] * dy)) for dx, dy in copies]
+    series = series * np.mean(moved, axis=0)
     perfect = {w: lens.otf(np.hypot(fx, fy[:, None]), w) for w in WAVELENGTHS}
     found = np.zeros(picture.shape)
     for row, column in np.ndindex(picture.shape):
@@ -73,3 +81,36 @@ def test_every_pixel_has_its_own_wavefront(knobs, name, truths):
     found = signal(path(g, *effects, transfer=transfer, knobs=knobs), of_picture(picture, PITCH))
     assert rms(found, expected) <= tolerance, rms(found, expected) / tolerance
     assert rms(expected, picture) > 0.05
+
+
+COPIES = 1.6e-6, 1.1e-6
+
+
+@pytest.mark.parametrize(
+    ("filter_kind", "plates", "copies"),
+    [
+        pytest.param(
+            ObliqueLowPass, (COPIES,), ((0.8e-6, 0.55e-6), (-0.8e-6, -0.55e-6)), id="oblique"
+        ),
+        pytest.param(
+            LowPassAlongAxes,
+            ((1.6e-6, 0.0), (0.0, 1.1e-6)),
+            ((0.8e-6, 0.55e-6), (-0.8e-6, 0.55e-6), (0.8e-6, -0.55e-6), (-0.8e-6, -0.55e-6)),
+            id="both axes",
+        ),
+    ],
+)
+def test_a_filter_that_doubles_the_image_acts_beside_a_field(filter_kind, plates, copies):
+    """Displaced copies of what every pixel's own wavefront makes."""
+    g = sensor(6, 8)
+    picture = np.random.default_rng(3).random((6, 8))
+    half_diagonal = float(np.hypot(g.sensor_width, g.sensor_height)) / 2
+    field, lens = FieldBlur(LENS, GROWING, half_diagonal), Diffraction(4.0, 0.0)
+    expected = by_own_wavefronts(picture, g, field, lens, copies)
+    effects = lens, field, filter_kind(plates), aperture(g)
+    transfer = light(*effects, wavelengths=WAVELENGTHS)
+    knobs = replace(REFERENCE, tolerance=0.0005)
+    found = signal(path(g, *effects, transfer=transfer, knobs=knobs), of_picture(picture, PITCH))
+    assert rms(found, expected) <= 0.0005
+    without = by_own_wavefronts(picture, g, field, lens)
+    assert rms(expected, without) > 0.01

@@ -176,7 +176,10 @@ exposure: {auto: {max: 100 ms}}
 """,
     "coma": """
 scene: {source: {kind: chart, chart: slanted-edge}}
-optics: {f_number: 2.8, zernike: {7: 30 nm, 8: 80 nm, 11: 40 nm}}
+optics:
+  f_number: 2.8
+  zernike: {7: 30 nm, 8: 80 nm, 11: 40 nm}
+  low_pass: {displacement: 2 um, axes: diagonal}
 array: {rows: 60, columns: 80}
 exposure: {auto: {max: 100 ms}}
 """,

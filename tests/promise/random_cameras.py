@@ -81,6 +81,10 @@ def tree(number: int) -> dict:
             "transmittance": [0.95, "ir-cut-650"],
             "off_axis": "cos4" if number % 2 else "exact",
             "stray_light": spread(0.003, 0.05),
+            "low_pass": {
+                "displacement": spread(0.3, 3, "um"),
+                "axes": ("both", "x", "y", "diagonal")[number % 4],
+            },
             "exit_pupil_distance": spread(0.5, 20, "mm"),
             **blur,
         },

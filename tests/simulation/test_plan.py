@@ -86,6 +86,7 @@ CAMERAS = {
         "accuracy": "standard",
         DARK: "5 ke/s",
         "optics.zernike": {4: "0.05 um"},
+        "optics.low_pass": {"displacement": "1 um", "axes": "diagonal"},
         "optics.distortion": {"k1": -0.5},
         "optics.lateral_color": {"table": {450: "-0.5 %", 650: "0.5 %"}},
         "optics.stray_light": 0.03,

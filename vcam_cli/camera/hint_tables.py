@@ -50,6 +50,10 @@ KEYS: Mapping[str, str] = {
     **dict.fromkeys(
         ("flare", "veiling_glare", "glare", "ghosting", "ghost"), "optics.stray_light: 2 %"
     ),
+    **dict.fromkeys(
+        ("olpf", "optical_low_pass", "low_pass_filter", "anti_aliasing", "anti_aliasing_filter"),
+        "optics.low_pass: {displacement: 2.3 um}",
+    ),
     "cos4": "optics.off_axis: cos4",
     **dict.fromkeys(
         ("radial_distortion", "k1", "k2", "k3", "p1", "p2", "dist_coeffs"),

@@ -22,6 +22,7 @@ from vcam_cli.config.values import (
     File,
     FileName,
     Fraction,
+    Gap,
     Length,
     MaybeLength,
     Shift,
@@ -170,6 +171,21 @@ def _prescription(given: Any) -> Prescription:
     if isinstance(given, str) and given:
         return Prescription.model_validate({"use": given})
     return Prescription.model_validate(given)
+
+
+class LowPassFilter(Model):
+    """A birefringent filter on the sensor, which doubles the image."""
+
+    displacement: Gap = key(
+        "distance of two copies on the sensor; contrast is 0 at half a cycle per displacement",
+        unit="um",
+        example="2.3 um",
+    )
+    axes: Literal["both", "x", "y", "diagonal"] = key(
+        "both: four copies at the corners of a square, by two crossed plates; else two, along x "
+        "(columns), y or the diagonal to the lower right",
+        default="both",
+    )
 
 
 Terms = tuple[tuple[int, float], ...]
@@ -495,6 +511,11 @@ class Optics(Model):
         " or {use: NAME, scale: 0.1, f_number: 4}; focal length, f-number, pupils, wavefronts,"
         " relative illumination, distortion and color errors follow from it",
         example="double-gauss",
+        default=None,
+    )
+    low_pass: Annotated[LowPassFilter | None, word_or(LowPassFilter, {"none": None})] = key(
+        "optical low-pass filter on the sensor, against aliasing: displaced copies of the image",
+        example={"displacement": "2.3 um"},
         default=None,
     )
     stray_light: Fraction = key("fraction of the mean irradiance added uniformly", default=0.0)

@@ -18,6 +18,7 @@ EFFECTS = {
     "depth": "defocus of depth layers",
     "distortion": "geometric distortion by the lens",
     "lateral_color": "lateral color: magnification by wavelength",
+    "low_pass": "copies of the image by a birefringent filter, against aliasing",
     "stray_light": "veiling glare: light spread uniformly over the sensor",
     "motion": "blur and skew by motion of scene or camera",
     "jitter": "blur by fast random pointing",

@@ -8,7 +8,7 @@
     spectrum of the image  Blur               diffraction, aberration,       electrons / s, blurred
                                               depth
     spectrum of the image  Blur               jitter                         electrons / s, blurred
-    spectrum of the image  SeparableTransfer  pixel_aperture                 electrons / s, blurred
+    spectrum of the image  SeparableTransfer  low_pass, pixel_aperture       electrons / s, blurred
     spectrum of the image  Blur               charge_diffusion               electrons / s, blurred
     electrons / s          Gain               off_axis                       electrons / s
     electrons / s          VeilingGlare       stray_light                    electrons / s
@@ -29,11 +29,12 @@
     electrons              Quantizer          quantization                   DN
 
 Kinds are classes of `base.py` and `signal_chain.py`; an aberration that changes over the field is a
-FieldTransfer; `before_shot` is a method of a NoiseSource: it changes the mean signal whose shot
-noise is drawn. Behind shot_noise, blooming moves charge, and then crosstalk couples sense nodes.
-Warps are composed in their order, from the scene to the sensor; where nothing else warps, motion
-may be a transfer function. Transfer functions multiply, so their order does not matter. Gains act
-on the blurred image: they are taken as constant over a pixel and a point spread function.
+FieldTransfer, a low_pass along a diagonal a Blur; `before_shot` is a method of a NoiseSource: it
+changes the mean signal whose shot noise is drawn. Behind shot_noise, blooming moves charge, and then
+crosstalk couples sense nodes. Warps are composed in their order, from the scene to the sensor; where
+nothing else warps, motion may be a transfer function. Transfer functions multiply, so their order
+does not matter. Gains act on the blurred image: they are taken as constant over a pixel and a point
+spread function.
 
 Within a kind the order of this tuple is the order of action; that of the noise in front of the ADC,
 which an automatic offset makes room for, is in `noise/sources.py`. It is written nowhere else.
@@ -50,6 +51,7 @@ from vcam_cli.effects.optics.depth import Depth
 from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.effects.optics.distortion import Distortion
 from vcam_cli.effects.optics.lateral_color import LateralColor
+from vcam_cli.effects.optics.low_pass import LowPass
 from vcam_cli.effects.optics.off_axis import OffAxis
 from vcam_cli.effects.optics.stray_light import StrayLight
 from vcam_cli.effects.pixel.blooming import Blooming
@@ -73,6 +75,7 @@ ORDER: tuple[type[Effect], ...] = (
     Aberration,
     Depth,
     Jitter,
+    LowPass,
     PixelAperture,
     ChargeDiffusion,
     OffAxis,

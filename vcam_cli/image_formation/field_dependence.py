@@ -27,6 +27,7 @@ from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import Blur, PlaneTransfer, Zone, of_kind
 from vcam_cli.image_formation.filtering import Filter
 from vcam_cli.image_formation.optical_path import Layer
+from vcam_cli.image_formation.plane_products import product_entries, times_blurs
 from vcam_cli.image_formation.scene_spectrum import SceneSpectrum
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.image_formation.transfer_tables import (
@@ -124,12 +125,13 @@ def _change(uniform_transfer: Transfer, blur: Blur, frequency: Array) -> Array:
     """Return what a blur adds to a transfer, by harmonics of the direction (m, K, C, n) [e/s].
 
     They are complex, see `direction_harmonics`. What depends on the direction is small: it is
-    computed at every second wavelength.
+    computed at every second wavelength. The transfer is its radial part, which `times_blurs`
+    multiplies by that of its blurs with a direction.
     """
     directed = of_kind([blur], PlaneTransfer)
     if not directed:
-        through = replace(uniform_transfer, effects=(*uniform_transfer.effects, blur))
-        change = through.radial_response(frequency) - uniform_transfer.radial_response(frequency)
+        whole = replace(uniform_transfer, effects=(*uniform_transfer.effects, blur))
+        change = whole.radial_response(frequency) - uniform_transfer.radial_response(frequency)
         return change[None].astype(np.complex128)
     light = uniform_transfer.with_half_the_wavelengths()
     change = np.moveaxis(directed[0].harmonics(frequency, light.wavelengths), -1, 1)
@@ -184,10 +186,17 @@ def tabulate_field(
     weights = np.array([m.values for m in maps])
     azimuth = maps[0].azimuth
 
+    def through(tables: Tables) -> Tables:
+        if not (uniform := uniform_transfer.plane_blurs):
+            return tables
+        entries = product_entries(uniform, rings, size)
+        return times_blurs(tables, uniform, entries, float(uniform_transfer.wavelengths[0]))
+
     def tables(family: Family, is_sine: bool, share: Array) -> Tables:
         table = _resampled(family.table(changes, share), base.shape[-1])
         sign = -1 if family.order % 2 or is_sine else 1  # of a wave, by `split_by_parity`
-        return Tables(mix, sign * table, size.top, error, order=family.order, is_sine=is_sine)
+        order = family.order
+        return through(Tables(mix, sign * table, size.top, error, order=order, is_sine=is_sine))
 
     modes = []
     for family, share in families:
@@ -197,7 +206,7 @@ def tabulate_field(
             for is_sine, turned in family.turned(azimuth)
         ]
     mean = _resampled(np.mean([change[0].real for change in changes], axis=0), base.shape[-1])
-    return Tables(mix, base + mean, size.top, error), tuple(modes)
+    return through(Tables(mix, base + mean, size.top, error)), tuple(modes)
 
 
 def ring_entries(rings: Sequence[Zone], size: TableSize) -> int:

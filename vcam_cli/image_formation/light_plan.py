@@ -160,8 +160,6 @@ def _blur_shares(cost: LightCost, budget: float) -> dict[Effect, float]:
     """Return a bound on what each blur of a path changes, relative to full signal."""
     path, scene = cost.path, cost.scene
     transfer = path.transfer
-    g = path.geometry
-    averaged = min(g.collecting_width, g.collecting_height) if path.separable else 0.0
     spreads = {e: e.spread(transfer.wavelengths) for e in of_kind(path.effects, *BLURS)}
     losses = {
         e: BlurLoss(
@@ -170,7 +168,7 @@ def _blur_shares(cost: LightCost, budget: float) -> dict[Effect, float]:
             e.largest_loss,
             e.is_even,
             e.is_uniform,
-            averaged if e in of_kind(spreads, StillWarp) else 0.0,
+            path.averaged_width if e in of_kind(spreads, StillWarp) else 0.0,
         )
         for e, spread in spreads.items()
         if spread is not None

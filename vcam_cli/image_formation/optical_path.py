@@ -164,6 +164,11 @@ class OpticalPath:
         return not self.separable or [e.box is not None for e in self.separable] == [True]
 
     @property
+    def averaged_width(self) -> float:
+        """Smaller side of the area that pixels average over [m]; 0 where they are points."""
+        return max((min(e.box) for e in self.separable if e.box is not None), default=0.0)
+
+    @property
     def field(self) -> FieldTransfer | None:
         """The blur that changes over the field, where there is one."""
         found = of_kind(self.effects, FieldTransfer)

@@ -392,6 +392,23 @@ def split_by_parity(plus: Array, minus: Array) -> Array:
     )
 
 
+def joined_parities(parts: Array) -> tuple[Array, Array]:
+    """Return a transfer function at (fx, fy) and at (fx, -fy) from its parts by `PARITIES`.
+
+    Parameters
+    ----------
+    parts : Array
+        Real parts (4, *shape), from `split_by_parity`.
+
+    Returns
+    -------
+    tuple of Array
+        Complex values (*shape) at (fx, fy) and at (fx, -fy).
+    """
+    even, both, along_x, along_y = parts
+    return even - both - 1j * (along_x + along_y), even + both + 1j * (along_y - along_x)
+
+
 def plane_grid(transfer: Transfer, top: float, entries: int) -> PlaneGrid:
     """Return a grid of frequencies from 0 along each axis.
 

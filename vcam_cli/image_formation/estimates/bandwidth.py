@@ -221,8 +221,8 @@ def highest_passed(path: OpticalPath, scene: Scene) -> float:
     limit = min(2 * pitch * path.transfer.cutoff, HIGHEST)
     f = np.linspace(0, limit, 257)
     values = np.abs(path.transfer.radial_response(f / (2 * pitch))).sum(axis=0).max(axis=0)
-    width = min(g.collecting_width, g.collecting_height) if path.separable else 0.0
-    envelope = values / (values[0] or 1.0) / np.maximum(1, np.pi * f / (2 * pitch) * width)
+    envelope = values / (values[0] or 1.0)
+    envelope = envelope / np.maximum(1, np.pi * f / (2 * pitch) * path.averaged_width)
     if math.isinf(path.transfer.cutoff):
         envelope = envelope * _passed_by_rays(path, f / (2 * pitch))
         if isinstance(scene, SampledScene) and scene.samples == "squares":

@@ -14,6 +14,7 @@ from vcam_cli.image_formation.estimates.bandwidth import axes
 from vcam_cli.image_formation.far_field import FarPart
 from vcam_cli.image_formation.field_dependence import ring_entries
 from vcam_cli.image_formation.optical_path import OpticalPath
+from vcam_cli.image_formation.plane_products import product_entries
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.transfer_tables import (
     PARITIES,
@@ -98,21 +99,26 @@ def table_bytes(path: OpticalPath, planes: int, size: TableSize) -> int:
     """
     colors = len(path.mosaic.colors)
     light = path.transfer.with_half_the_wavelengths().wavelengths
+    of_blurs = 0
     if directed := path.transfer.plane_blurs:
-        entries = size.plane_entries(directed)
+        if path.field_rings:
+            entries = product_entries(directed, path.field_rings, size)
+        else:
+            entries = size.plane_entries(directed)
         per_table = entries**2 * planes * colors * len(PARITIES)
         # by wavelength, by parity, and copies of the latter
         tables = len(light) * 2 * entries**2 * 24 + 3 * 8 * per_table
-        return round(SLACK * (tables + sum(blur.kept_bytes(light) for blur in directed)))
+        of_blurs = round(SLACK * (tables + sum(blur.kept_bytes(light) for blur in directed)))
     directed = of_kind([ring.blur for ring in path.field_rings], PlaneTransfer)
     if not directed:
-        return 0
+        return of_blurs
     grids = [blur.kept_bytes(light, by_harmonics=True) for blur in directed]
     harmonics = MOST if any(grids) or math.isinf(path.transfer.cutoff) else FEW_HARMONICS
     # of every ring all harmonics; of one of them by wavelength, its copy, and real parts
     values = len(directed) * planes * colors + 4 * len(light)
     tables = 16 * ring_entries(path.field_rings, size) * values * harmonics
-    return round(SLACK * (tables + min(sum(grids), GRID_CACHE_BYTES + max(grids))))
+    of_field = round(SLACK * (tables + min(sum(grids), GRID_CACHE_BYTES + max(grids))))
+    return of_blurs + of_field
 
 
 def _values(
