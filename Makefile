@@ -20,6 +20,7 @@ lint: $(VENV)/.dev  ## format, lint, spelling, types
 	$(BIN)/ruff format --check $(SOURCES)
 	$(BIN)/ruff check $(SOURCES)
 	$(BIN)/typos
+	$(BIN)/python scripts/plain_words.py
 	$(BIN)/mypy
 
 check: lint test-all  ## format, lint, spelling, types, all tests

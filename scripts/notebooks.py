@@ -43,7 +43,7 @@ def cells(path: Path) -> list[Cell]:
 def run(path: Path, instead: Mapping[str, str] | None = None) -> tuple[list[Cell], dict[str, Any]]:
     """Return the cells of a notebook, run in an empty folder, and the variables at their end.
 
-    `instead` replaces texts of its code, each of which stands in one place.
+    `instead` replaces texts of its code. Each must occur once.
     """
     import matplotlib
 

@@ -30,11 +30,11 @@
 
 Kinds are classes of `base.py` and `signal_chain.py`; an aberration that changes over the field is a
 FieldTransfer, a low_pass along a diagonal a Blur; `before_shot` is a method of a NoiseSource: it
-changes the mean signal whose shot noise is drawn. Behind shot_noise, blooming moves charge, and then
-crosstalk couples sense nodes. Warps are composed in their order, from the scene to the sensor; where
-nothing else warps, motion may be a transfer function. Transfer functions multiply, so their order
-does not matter. Gains act on the blurred image: they are taken as constant over a pixel and a point
-spread function.
+changes the mean signal whose shot noise is drawn. Behind shot_noise, blooming moves charge, and
+then crosstalk couples sense nodes. Warps are composed in their order, from the scene to the sensor;
+where nothing else warps, motion may be a transfer function. Transfer functions multiply, so their
+order does not matter. Gains act on the blurred image: they are taken as constant over a pixel and a
+point spread function.
 
 Within a kind the order of this tuple is the order of action; that of the noise in front of the ADC,
 which an automatic offset makes room for, is in `noise/sources.py`. It is written nowhere else.

@@ -26,7 +26,7 @@ from vcam_cli.image_formation.transfer_tables import (
 def product_entries(blurs: Sequence[PlaneTransfer], rings: Sequence[Zone], size: TableSize) -> int:
     """Return the entries along an axis of tables of blurs times those of a field.
 
-    A product reaches as far as both together.
+    The reach of a product is the sum of both.
 
     Parameters
     ----------

@@ -1,5 +1,7 @@
 """A cache of computed tables that is bounded by the memory they take."""
 
+from __future__ import annotations
+
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from threading import Lock
@@ -24,6 +26,10 @@ class ByteCache(Generic[T]):
         self._limit, self._least = limit, 0 if strict else 1
         self._kept: OrderedDict[Hashable, T] = OrderedDict()
         self._lock = Lock()
+
+    def __reduce__(self) -> tuple[type[ByteCache[T]], tuple[int, bool]]:
+        """Pickle as an empty cache of the same limit: results can be computed again."""
+        return type(self), (self._limit, not self._least)
 
     def get(self, key: Hashable, compute: Callable[[], T]) -> T:
         """Return the result of `compute`, or the one that is kept for the same key.

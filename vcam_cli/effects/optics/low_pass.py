@@ -34,7 +34,7 @@ class LowPass(Effect):
 
     name = "low_pass"
     reference = "J. E. Greivenkamp, Appl. Opt. 29, 676, 1990 (optical prefilters)"
-    absent = "optics.low_pass is none"
+    absent = "optics.low_pass has the value none"
 
     @classmethod
     def from_camera(cls, camera: Camera, geometry: Geometry) -> Effect | None:

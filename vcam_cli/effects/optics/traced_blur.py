@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from threading import Lock
+from typing import Any
 
 import numpy as np
 
@@ -68,6 +69,14 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
     kept: dict[float, OtfGrid] = field(default_factory=dict)
     """Grids by wavelength, shared by all angles."""
     lock: Lock = field(default_factory=Lock)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is pickled: neither the lock nor tables that can be computed again."""
+        return {**self.__dict__, "kept": {}, "lock": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take a pickled state, with a lock of its own."""
+        self.__dict__.update(state, lock=Lock())
 
     @classmethod
     def from_camera(cls, camera: Camera, geometry: Geometry) -> None:
