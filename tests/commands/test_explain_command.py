@@ -90,7 +90,9 @@ def test_the_models_of_a_picture_are_listed():
 
 
 def test_what_is_not_simulated_is_told():
-    assert vcam("smear").stdout.startswith("smear (not simulated)\n  Charge is transferred")
+    assert vcam("smear").stdout.startswith(
+        "smear (not simulated)\n  Charge transfer is instantaneous"
+    )
 
 
 def test_a_metric_by_its_name_without_unit():
