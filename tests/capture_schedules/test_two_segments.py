@@ -98,7 +98,7 @@ density: [histogram, kernel, nearest-neighbor, penalized-likelihood]
     ("text", "wanted"),
     [
         ("pdf: {uniform: {min: 0, max: 1}}\nsegments: 2\ndensity: kernel", "counts pixels"),
-        ("pdf: {uniform: {min: 0, max: 1}}\ndensity: kernel", "changes nothing"),
+        ("pdf: {uniform: {min: 0, max: 1}}\ndensity: kernel", "has no effect"),
         ("pdf: {uniform: {min: 0, max: 1}}\nsegments: 2\ndensity: kernal", "kernel"),
     ],
 )

@@ -180,7 +180,7 @@ def test_meters_a_second_need_a_distance(tmp_path):
     far = {"scene.distance": "infinity", "scene.source.motion": {"x": "1 m/s"}}
     file = tmp_path / "wrong.yaml"
     file.write_text(yaml.safe_dump(tree(far), sort_keys=False), encoding="utf-8")
-    with pytest.raises(BadInput, match="infinitely far"):
+    with pytest.raises(BadInput, match="object at infinity"):
         checks.load(str(file))
 
 

@@ -195,7 +195,7 @@ def test_a_file_stands_in_place_of_speeds(tmp_path):
     both = {"scene.camera_motion": {"file": str(file), "pan": "1 deg/s"}}
     made = tmp_path / "wrong.yaml"
     made.write_text(yaml.safe_dump(tree(both), sort_keys=False), encoding="utf-8")
-    with pytest.raises(BadInput, match="beside a file of angles"):
+    with pytest.raises(BadInput, match="in addition to a file of angles"):
         checks.load(str(made))
 
 

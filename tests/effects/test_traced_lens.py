@@ -143,11 +143,11 @@ def test_falloff_is_the_pupils_area():
 
 WRONG = {
     "optics.prescription=dubble-gauss": "did you mean 'double-gauss'?",
-    "optics.f_number=2.8": "cannot be given beside prescription",
-    "optics.zernike={4: 0.1 um}": "cannot be given beside prescription",
+    "optics.f_number=2.8": "cannot be combined with prescription",
+    "optics.zernike={4: 0.1 um}": "cannot be combined with prescription",
     "optics.prescription={use: sonnar, scale: 0.02}": "forms no image at the corner",
     "optics.prescription={use: sonnar, scale: 10}": "stop down",
-    "optics.distortion={k1: 0.1}": "cannot be given beside prescription",
+    "optics.distortion={k1: 0.1}": "cannot be combined with prescription",
     "optics.prescription={file: nothing.zmx}": "nothing.zmx",
 }
 

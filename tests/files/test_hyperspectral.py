@@ -86,7 +86,7 @@ class TestSpectralExr:
         names += ["T.400,000000nm.500,000000nm", "T.450,000000nm.500,000000nm"]
         path = made.exr(tmp_path / "a.exr", names, np.dstack([CUBE, CUBE[:, :, :2]]))
         [note] = holds(path)
-        assert "2 bispectral channels are not used" in note
+        assert "2 bispectral channels are ignored" in note
 
     def test_refuses_what_is_no_radiance(self, tmp_path):
         path = made.spectral_exr(tmp_path / "a.exr", emissiveUnits="cd.m^-2.nm^-1")
@@ -346,12 +346,12 @@ class TestIsetcam:
         data = bytearray(path.read_bytes())
         data[400] ^= 0xFF
         path.write_bytes(data)
-        refused(path, "no whole MATLAB file")
+        refused(path, "no complete MATLAB file")
 
     def test_refuses_what_is_no_matlab(self, tmp_path):
         path = tmp_path / "a.mat"
         path.write_text("photons\n" * 100)
-        refused(path, "no whole MATLAB file")
+        refused(path, "no complete MATLAB file")
 
     def test_version_7_3_without_h5py_says_how_to_get_it(self, tmp_path, monkeypatch):
         real = importlib.import_module
@@ -422,7 +422,7 @@ class TestIsetcam:
         white = read(tmp_path / "a.mat")[0].bands.white
         np.testing.assert_allclose(white, self.WHITE * 1e9, rtol=1e-12)
         (tmp_path / "a.mat").write_bytes((tmp_path / "a.mat").read_bytes()[:900])
-        refused(tmp_path / "a.mat", "no whole MATLAB file")
+        refused(tmp_path / "a.mat", "no complete MATLAB file")
 
 
 class TestNpz:
@@ -475,7 +475,7 @@ class TestNpz:
     def test_refuses_a_truncated_file(self, compress, tmp_path):
         path = made.npz(tmp_path / "a.npz", compress, wavelength_nm=NM, radiance=CUBE)
         path.write_bytes(path.read_bytes()[:-30])
-        refused(path, "no whole npz")
+        refused(path, "no complete npz")
 
     @pytest.mark.parametrize("name", [b"radiance.npy", b"wavelength_nm.npy"])
     def test_refuses_damaged_bytes(self, name, tmp_path):

@@ -380,7 +380,7 @@ def test_header_of_what_is_no_image(tmp_path):
 @pytest.mark.parametrize("content", [b"", b"this is no image at all\n" * 9, b"\0" * 200])
 def test_files_that_are_no_image(tmp_path, name, content):
     (tmp_path / name).write_bytes(content)
-    refused(tmp_path / name, "empty|no image|truncated")
+    refused(tmp_path / name, "empty|as an image|truncated")
 
 
 def test_what_is_no_regular_file(tmp_path):
@@ -400,7 +400,7 @@ def test_absurd_sizes_are_refused_by_the_header(tmp_path):
     claim = body.replace(struct.pack(">II", 10**6, 1), struct.pack(">II", 10**6, 10**6))
     crc = struct.pack(">I", zlib.crc32(claim[12:29]))
     (tmp_path / "a.png").write_bytes(claim[:29] + crc + claim[33:])
-    refused(tmp_path / "a.png", "pixels|no image")
+    refused(tmp_path / "a.png", "pixels|as an image")
 
 
 def test_image_beyond_the_memory_is_cannot_do(tmp_path, monkeypatch):
