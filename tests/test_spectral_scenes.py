@@ -161,8 +161,8 @@ def test_a_file_is_checked_before_anything_is_computed(tmp_path):
     wrong = ["scene.wavelengths.stop=800 nm", "scene.luminance=from-file"]
     with pytest.raises(BadInput, match="covers 400 nm to 700 nm"):
         load(tmp_path / "made.yaml", wrong[:1])
-    with pytest.raises(BadInput, match="no level of their own"):
+    with pytest.raises(BadInput, match="no absolute level"):
         load(tmp_path / "made.yaml", wrong[1:])
     (tmp_path / "cube.npz").write_bytes(b"PK")
-    with pytest.raises(BadInput, match="no whole npz"):
+    with pytest.raises(BadInput, match="no complete npz"):
         load(tmp_path / "made.yaml")

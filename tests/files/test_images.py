@@ -371,7 +371,7 @@ def test_color_channels_by_the_header_alone(tmp_path, channels):
 
 def test_header_of_what_is_no_image(tmp_path):
     (tmp_path / "a.png").write_text("no image")
-    with pytest.raises(BadInput, match="no image") as caught:
+    with pytest.raises(BadInput, match="as an image") as caught:
         images.color_channels(tmp_path / "a.png", YAML)
     assert caught.value.problems[0].path == YAML
 
@@ -380,7 +380,7 @@ def test_header_of_what_is_no_image(tmp_path):
 @pytest.mark.parametrize("content", [b"", b"this is no image at all\n" * 9, b"\0" * 200])
 def test_files_that_are_no_image(tmp_path, name, content):
     (tmp_path / name).write_bytes(content)
-    refused(tmp_path / name, "empty|as an image|truncated")
+    refused(tmp_path / name, "empty|as an image|no image|truncated")
 
 
 def test_what_is_no_regular_file(tmp_path):

@@ -115,7 +115,7 @@ LIES = {
 
 @pytest.mark.parametrize("lie", LIES)
 def test_refuses_what_is_not_so(lie, tmp_path):
-    with pytest.raises(UnusableFile, match="no whole MATLAB file"):
+    with pytest.raises(UnusableFile, match="no complete MATLAB file"):
         read_variables(file(tmp_path, LIES[lie]), ["photons"])
 
 

@@ -82,7 +82,7 @@ def test_refuses_what_is_no_point_spread(tmp_path):
 def test_refuses_what_is_no_image(tmp_path):
     refused(tmp_path / "none.exr", "no such file")
     (tmp_path / "text.exr").write_text("hello")
-    refused(tmp_path / "text.exr", "no image")
+    refused(tmp_path / "text.exr", "as an image")
     (tmp_path / "empty.exr").touch()
     refused(tmp_path / "empty.exr", "empty")
     refused(tmp_path, "folder")

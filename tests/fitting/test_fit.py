@@ -123,7 +123,7 @@ def test_dark_codes_that_are_cut_off_are_said(taken, tmp_path):
     for file in folder.glob("*.npy"):
         lower = np.load(file).astype(int) - round(known["black_level"])
         np.save(tmp_path / file.name, np.maximum(lower, 0).astype(np.uint16))
-    assert "of the dark codes are 0" in " ".join(fitted(tmp_path, form).notes)
+    assert "of the dark codes are clipped at 0" in " ".join(fitted(tmp_path, form).notes)
 
 
 def test_what_frames_cannot_tell_is_named(taken):

@@ -78,6 +78,10 @@ REASONS: dict[str, tuple[str, Callable[[Result], bool]]] = {
         "dark signals of less than a tenth of an electron differ by nothing in few pixels",
         lambda r: r.frame.dark_rate * r.exposure_time < 0.1,
     ),
+    "pixel.blooming": (
+        "no pixel exceeds its full well",
+        lambda r: r.electrons.max() < r.frame.electrical.full_well,
+    ),
     "seed.sensor": ("the sensor has no pattern", _has_no_pattern),
     "scene.wavelengths.start": (
         "no color responds there",

@@ -418,7 +418,7 @@ def checked(folder, changes):
             {"array": {"die": {"width": "0.26 mm", "height": "0.235 mm"}, "pattern": "monochrome"}},
             {"array.die.height": ("47 rows", "0.23 mm or 0.24 mm")},
         ),
-        ({"array.pattern": "honeycomb"}, {"array.binning": ("neighbors", "binning: none")}),
+        ({"array.pattern": "honeycomb"}, {"array.binning": ("rows and columns", "binning: none")}),
     ],
 )  # fmt: skip
 def test_what_cannot_be_joined_is_told(changes, places, tmp_path):

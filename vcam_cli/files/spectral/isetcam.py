@@ -255,6 +255,6 @@ def _hdf5(path: Path) -> Lookup:
                 _refuse_claims(path, found)
                 return found[()].T
         except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
-            raise UnusableFile(f"is no whole MATLAB file ({str(error)[:80]})", _WHOLE) from None
+            raise UnusableFile(f"is no complete MATLAB file ({str(error)[:80]})", _WHOLE) from None
 
     return get

@@ -59,7 +59,7 @@ def read_variables(path: Path, names: Collection[str]) -> dict[str, Value]:
         try:
             return _variables(_Bytes(m, order, HEADER, len(m)), names, path)
         except (_Damaged, zlib.error) as error:
-            raise UnusableFile(f"is no whole MATLAB file ({str(error)[:80]})") from None
+            raise UnusableFile(f"is no complete MATLAB file ({str(error)[:80]})") from None
 
 
 def read_shapes(path: Path) -> dict[str, tuple[int, ...]]:
