@@ -135,7 +135,7 @@ def _color_kernels(kernels: Kernels, response: PixelResponse, white: Spectrum) -
 
 
 def spread(signal: Array, kernels: Array, sites: Array) -> Array:
-    """Return a signal of which every pixel gives shares to its neighbors.
+    """Return a signal after every pixel has given shares to its neighbors.
 
     Beyond the border lie pixels that hold what those a period of the block further in do: the
     pattern of colors goes on.

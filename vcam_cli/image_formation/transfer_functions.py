@@ -178,7 +178,7 @@ class Transfer:
         Parameters
         ----------
         effects : sequence of Effect
-            These effects, of which only blurs count.
+            These effects. Only blurs count.
 
         Returns
         -------

@@ -337,7 +337,7 @@ def ideal_values(
     scene : AnyScene
         The scene.
     effects : sequence of Effect
-        Effects of the camera, of which still warps count but magnifications.
+        Effects of the camera. Still warps other than magnifications count.
     geometry : Geometry
         Geometry of the array.
     x, y : Array

@@ -1,4 +1,4 @@
-"""Refractive indices: makers' dispersion formulas, and glasses of which only nd and Vd are known.
+"""Refractive indices: makers' dispersion formulas, and glasses known by nd and Vd alone.
 
 All indices are relative to air, at about 20 C. The formulas come from the refractiveindex.info
 database (M. Polyanskiy, CC0 1.0), see `data/glasses.csv`.
@@ -78,7 +78,7 @@ class CatalogGlass(Glass):
 
 @dataclass(frozen=True)
 class ModelGlass(Glass):
-    """A glass of which nd and Vd are known: n = A + B / l + C / l^3.5 (Conrady, l in um).
+    """A glass known by nd and Vd: n = A + B / l + C / l^3.5 (Conrady, l in um).
 
     The three constants follow from nd, nF - nC = (nd - 1) / Vd, and the partial dispersion of the
     normal line, P_gF = 0.6438 - 0.001682 Vd. The last is a choice: an anomalous glass differs.

@@ -15,7 +15,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.exposure import Exposure
 from vcam_cli.effects.base import Gain
-from vcam_cli.errors import bad
+from vcam_cli.errors import Path, bad
 from vcam_cli.image_formation.pixel_response import PixelResponse, axis_levels
 from vcam_cli.physics import readout
 from vcam_cli.spectra import VISIBLE, Spectrum, illuminant, luminance
@@ -106,9 +106,7 @@ def limited(exposure: Exposure, base_iso: float, least: float) -> Exposure:
     auto, path = exposure.auto, "exposure.auto.max_iso"
     if auto is None or auto.max_iso is None:
         return exposure
-    if base_iso == 0:
-        message = "this camera sees nothing of daylight, and has no ISO speed"
-        raise bad(path, message, "give exposure.auto.max_gain")
+    _require_daylight(base_iso, path, "give exposure.auto.max_gain")
     most = auto.max_iso / base_iso
     if most < least:
         message = f"is below ISO {base_iso * least:.4g}, the camera's at gain {least:g}"
@@ -142,12 +140,16 @@ def gain(exposure: Exposure, base_iso: float, given: float) -> float:
     path = ("exposure", "iso")
     if exposure.iso is None:
         return given
-    if base_iso == 0:
-        message = "this camera sees nothing of daylight, and has no ISO speed"
-        raise bad(path, message, "give exposure.gain")
+    _require_daylight(base_iso, path, "give exposure.gain")
     found = exposure.iso / base_iso
     auto = exposure.auto
     if auto and "max_gain" in auto.model_fields_set and found > auto.max_gain:
         message = f"is a gain of {found:.4g} (base ISO {base_iso:.4g}), more than auto.max_gain"
         raise bad(path, message, "raise max_gain, or lower iso")
     return found
+
+
+def _require_daylight(base_iso: float, path: Path | str, remedy: str) -> None:
+    """Refuse an ISO speed where the camera has no response to daylight (BadInput)."""
+    if base_iso == 0:
+        raise bad(path, "this camera sees nothing of daylight, and has no ISO speed", remedy)

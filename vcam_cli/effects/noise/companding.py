@@ -20,7 +20,7 @@ from vcam_cli.effects.signal_chain import Quantizer
 
 @dataclass(frozen=True)
 class CompandedQuantization(Quantizer):
-    """A linear ADC, the codes of which are compressed and rounded once more."""
+    """A linear ADC whose codes are compressed and rounded once more."""
 
     adc: Quantizer
     knees: tuple[tuple[int, int], ...]
