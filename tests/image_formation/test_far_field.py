@@ -138,8 +138,8 @@ def test_filters_go_as_far_as_the_low_pass_of_rings(monkeypatch):
     assert rms(found.values, exact) < 0.05 * STANDARD.tolerance * exact.max()
 
 
-@pytest.mark.parametrize(("rows", "followed"), [(100, 2), (240, 0)])
-def test_modes_are_left_out_of_far_light_that_hardly_counts(rows, followed, monkeypatch):
+@pytest.mark.parametrize(("rows", "parts", "followed"), [(100, 10, 2), (240, 8, 0)])
+def test_modes_are_left_out_of_far_light_that_hardly_counts(rows, parts, followed, monkeypatch):
     """Of bright patches around a small array those next to it count, around a larger one none.
 
     A tenth of the tolerance is what that light may be; what the modes change of it is less.
@@ -156,11 +156,11 @@ def test_modes_are_left_out_of_far_light_that_hardly_counts(rows, followed, monk
     own = far_field.FarField.parts_with_modes
     monkeypatch.setattr(far_field.FarField, "parts_with_modes", spy)
     few = prepare(made, 1)[0]
-    assert few.spectrum.far_parts == 10
-    assert few.spectrum.far_filters == 10 + followed * (few.spectrum.filters - 1)
+    assert few.spectrum.far_parts == parts
+    assert few.spectrum.far_filters == parts + followed * (few.spectrum.filters - 1)
     monkeypatch.setattr(far_field, "MODES_SHARE", 0.0)
     all_of_them = prepare(made, 1)[0]
-    assert found == [followed, 10]
+    assert found == [followed, parts]
     error = rms(few.rate, all_of_them.rate) * few.exposure_time
     allowed = 0.1 * made.accuracy.tolerance * ablation.full_signal(few)
     assert error < allowed / 10
