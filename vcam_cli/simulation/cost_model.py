@@ -149,6 +149,8 @@ def irradiance_seconds(camera: Solved, report: SpectrumReport) -> float:
         Time [s]; 0 where no file needs it.
     """
     files = bool(camera.output.irradiance) + camera.output.isetcam
+    if not files:
+        return 0.0
     band, geometry = camera.scene.wavelengths, camera.geometry
     count = len(Band(band.start, band.stop, camera.settings.wavelength_step).nodes())
     together = image_seconds(geometry, BANDS_AT_ONCE, report) / BANDS_AT_ONCE
