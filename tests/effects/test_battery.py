@@ -19,22 +19,21 @@ from making import QUIET, camera, radiance_for
 from vcam_cli import simulate
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.simulation import EFFECTS
-from vcam_cli.effects.base import (
+from vcam_cli.effects.base import SignalLevels
+from vcam_cli.effects.blurs import RadialTransfer, SeparableTransfer
+from vcam_cli.effects.optics.depth import Depth
+from vcam_cli.effects.order import ORDER
+from vcam_cli.effects.pixel_signal import (
     Charge,
     Gain,
     NeighborSharing,
     Overflow,
-    RadialTransfer,
-    SeparableTransfer,
-    SignalLevels,
     TemporalGain,
     Transport,
     VeilingGlare,
-    Warp,
 )
-from vcam_cli.effects.optics.depth import Depth
-from vcam_cli.effects.order import ORDER
 from vcam_cli.effects.signal_chain import Limit, NoiseSource, Quantizer, Site
+from vcam_cli.effects.warps import Warp
 from vcam_cli.image_formation.neighbor_sharing import spread
 from vcam_cli.rng import BLOCK_ROWS, stream
 

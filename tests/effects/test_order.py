@@ -5,11 +5,12 @@ import re
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.simulation import EFFECTS
 from vcam_cli.config.key_index import keys
-from vcam_cli.effects import base, order, signal_chain
+from vcam_cli.effects import blurs, order, pixel_signal, signal_chain, warps
 from vcam_cli.effects.order import ORDER
 from vcam_cli.effects.signal_chain import NoiseSource
 
 BEFORE_SHOT = "before_shot"
+KINDS = {**vars(blurs), **vars(warps), **vars(pixel_signal), **vars(signal_chain)}
 
 
 def rows() -> list[tuple[str, list[str]]]:
@@ -33,8 +34,7 @@ def test_the_table_has_every_effect_once_in_the_order_of_action():
 
 
 def test_the_table_has_every_effect_in_the_row_of_its_kind():
-    kinds = {row: getattr(base, row, None) or getattr(signal_chain, row)
-             for row, _ in rows() if row != BEFORE_SHOT}  # fmt: skip
+    kinds = {row: KINDS[row] for row, _ in rows() if row != BEFORE_SHOT}
     effects = {kind.name: kind for kind in ORDER}
     for row, names in rows():
         for name in names if row in kinds else ():

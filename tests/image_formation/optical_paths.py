@@ -12,7 +12,8 @@ import numpy as np
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.mosaic import Mosaic
-from vcam_cli.effects.base import Blur, Effect, PlaneTransfer, RadialTransfer, of_kind
+from vcam_cli.effects.base import Effect, of_kind
+from vcam_cli.effects.blurs import Blur, PlaneTransfer, RadialTransfer
 from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
 from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.estimates import bandwidth

@@ -9,7 +9,8 @@ from making import camera, radiance_for
 from optical_paths import of_camera, rms
 
 from vcam_cli import simulate
-from vcam_cli.effects.base import Blur, of_kind
+from vcam_cli.effects.base import of_kind
+from vcam_cli.effects.blurs import Blur
 from vcam_cli.files.images.png import write_png
 from vcam_cli.image_formation import light_plan
 from vcam_cli.image_formation.light_plan import OMITTED_SHARE

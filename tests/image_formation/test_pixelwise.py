@@ -8,10 +8,10 @@ from making import camera
 
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.derived.mosaic import Mosaic
-from vcam_cli.effects.base import Gain
 from vcam_cli.effects.optics.stray_light import StrayLight
 from vcam_cli.effects.pixel.dark_current import DarkCurrent
 from vcam_cli.effects.pixel.saturation import Saturation
+from vcam_cli.effects.pixel_signal import Gain
 from vcam_cli.image_formation.pixelwise import changes_by_omission
 
 TIME, DARK, WELL = 0.5, 300.0, 500.0

@@ -9,7 +9,7 @@ from optical_paths import GRAY, Gaussian, Leaning
 from scipy.special import erf
 
 from vcam_cli.camera.derived.geometry import geometry
-from vcam_cli.effects.base import FieldTransfer, PlaneTransfer, RadialTransfer, Zone
+from vcam_cli.effects.blurs import FieldTransfer, PlaneTransfer, RadialTransfer, Zone
 from vcam_cli.image_formation import strategies
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.estimates.power_spectrum import power_spectrum

@@ -24,7 +24,8 @@ from vcam_cli import load, simulate
 from vcam_cli.accuracy_study import ablation
 from vcam_cli.accuracy_study.reference import effect_changes, prepare_converged
 from vcam_cli.camera.camera import Camera
-from vcam_cli.effects.base import Charge, of_kind
+from vcam_cli.effects.base import of_kind
+from vcam_cli.effects.pixel_signal import Charge
 from vcam_cli.effects.signal_chain import NoiseSource
 from vcam_cli.floats import rms
 from vcam_cli.simulation.preparation import Prepared

@@ -8,8 +8,8 @@ import pytest
 from making import GONE, QUIET, camera, long_except, radiance_for
 
 from vcam_cli import simulate
-from vcam_cli.effects.base import Charge
 from vcam_cli.effects.order import ORDER
+from vcam_cli.effects.pixel_signal import Charge
 from vcam_cli.effects.signal_chain import NoiseSource
 from vcam_cli.errors import BadInput
 from vcam_cli.simulation.checks import check_effects

@@ -17,8 +17,9 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
-from vcam_cli.effects.base import Charge, of_kind
+from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.order import ORDER
+from vcam_cli.effects.pixel_signal import Charge
 from vcam_cli.effects.signal_chain import (
     NoiseSource,
     Quantizer,

@@ -9,7 +9,8 @@ from typing import Any
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.simulation import Accuracy
-from vcam_cli.effects.base import FieldTransfer, of_kind
+from vcam_cli.effects.base import of_kind
+from vcam_cli.effects.blurs import FieldTransfer
 from vcam_cli.simulation.preparation import Prepared
 
 CONVERGED = 2e-5

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vcam_cli.arrays import Array
-from vcam_cli.effects.base import Effect, SeparableTransfer, of_kind
+from vcam_cli.effects.base import Effect, of_kind
+from vcam_cli.effects.blurs import SeparableTransfer
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.simulation.preparation import Prepared
 

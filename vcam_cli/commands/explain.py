@@ -147,7 +147,8 @@ def _effects() -> dict[str, Any]:
 def _of_effect(word: str) -> Iterator[dict[str, Any]]:
     import inspect
 
-    from vcam_cli.effects.base import Blur, FieldTransfer, ImageMotion, SeparableTransfer
+    from vcam_cli.effects.blurs import Blur, FieldTransfer, SeparableTransfer
+    from vcam_cli.effects.warps import ImageMotion
 
     effect = _effects().get(word.removeprefix("effects.").replace("-", "_"))
     if effect is None:

@@ -28,7 +28,7 @@
     electrons              NoiseSource        adc_noise                      electrons
     electrons              Quantizer          quantization                   DN
 
-Kinds are classes of `base.py` and `signal_chain.py`; an aberration that changes over the field is a
+`base.py` says where the classes of the kinds are; an aberration that changes over the field is a
 FieldTransfer, a low_pass along a diagonal a Blur; `before_shot` is a method of a NoiseSource: it
 changes the mean signal whose shot noise is drawn. Behind shot_noise, blooming moves charge, and
 then crosstalk couples sense nodes. Warps are composed in their order, from the scene to the sensor;

@@ -24,7 +24,8 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import Blur, PlaneTransfer, Zone, of_kind
+from vcam_cli.effects.base import of_kind
+from vcam_cli.effects.blurs import Blur, PlaneTransfer, Zone
 from vcam_cli.image_formation.filtering import Filter
 from vcam_cli.image_formation.optical_path import Layer
 from vcam_cli.image_formation.plane_products import product_entries, times_blurs

@@ -15,7 +15,8 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import pixel_centers
-from vcam_cli.effects.base import Blur, Effect, FieldTransfer, SeparableTransfer, of_kind
+from vcam_cli.effects.base import Effect, of_kind
+from vcam_cli.effects.blurs import Blur, FieldTransfer, SeparableTransfer
 from vcam_cli.image_formation.field_dependence import Map, zone_maps
 from vcam_cli.image_formation.optical_path import Layer, Layers, OpticalPath, SpectrumReport
 from vcam_cli.image_formation.transfer_functions import Transfer

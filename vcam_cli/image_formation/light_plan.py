@@ -16,21 +16,11 @@ from itertools import combinations
 
 import numpy as np
 
-from vcam_cli.effects.base import (
-    Blur,
-    Effect,
-    FieldTransfer,
-    Gain,
-    NeighborSharing,
-    SeparableTransfer,
-    SignalLevels,
-    StillWarp,
-    Transport,
-    VeilingGlare,
-    Warp,
-    of_kind,
-)
+from vcam_cli.effects.base import Effect, SignalLevels, of_kind
+from vcam_cli.effects.blurs import Blur, FieldTransfer, SeparableTransfer
 from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
+from vcam_cli.effects.pixel_signal import Gain, NeighborSharing, Transport, VeilingGlare
+from vcam_cli.effects.warps import StillWarp, Warp
 from vcam_cli.image_formation.estimates.edge_changes import exact_changes, has_straight_edges
 from vcam_cli.image_formation.estimates.light_cost import LightCost
 from vcam_cli.image_formation.optical_path import OpticalPath

@@ -11,7 +11,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.camera.sensor.crosstalk import Kernels
-from vcam_cli.effects.base import NeighborSharing
+from vcam_cli.effects.pixel_signal import NeighborSharing
 from vcam_cli.image_formation.pixel_response import PixelResponse, axis_levels
 from vcam_cli.spectra import Spectrum
 

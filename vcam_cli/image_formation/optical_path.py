@@ -12,14 +12,9 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.mosaic import Mosaic
-from vcam_cli.effects.base import (
-    Effect,
-    FieldTransfer,
-    ImageMotion,
-    SeparableTransfer,
-    Zone,
-    of_kind,
-)
+from vcam_cli.effects.base import Effect, of_kind
+from vcam_cli.effects.blurs import FieldTransfer, SeparableTransfer, Zone
+from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.transfer_functions import Transfer
 

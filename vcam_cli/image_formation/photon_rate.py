@@ -18,7 +18,9 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.camera.derived.mosaic import Mosaic
-from vcam_cli.effects.base import Effect, Gain, ImageMotion, VeilingGlare, of_kind
+from vcam_cli.effects.base import Effect, of_kind
+from vcam_cli.effects.pixel_signal import Gain, VeilingGlare
+from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.image_formation.light_plan import LightPlan, light_plan
 from vcam_cli.image_formation.optical_path import Layer, OpticalPath, SpectrumReport
 from vcam_cli.image_formation.settings import Settings

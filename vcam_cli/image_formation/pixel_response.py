@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from vcam_cli.arrays import Array
-from vcam_cli.effects.base import Blur, Effect, Gain, of_kind
+from vcam_cli.effects.base import Effect, of_kind
+from vcam_cli.effects.blurs import Blur
+from vcam_cli.effects.pixel_signal import Gain
 from vcam_cli.image_formation.transfer_functions import Band, Transfer, transfer
 from vcam_cli.spectra import Spectrum
 

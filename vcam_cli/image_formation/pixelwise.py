@@ -14,7 +14,8 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.camera.derived.mosaic import Mosaic
-from vcam_cli.effects.base import Charge, Effect, Gain, VeilingGlare, of_kind
+from vcam_cli.effects.base import Effect, of_kind
+from vcam_cli.effects.pixel_signal import Charge, Gain, VeilingGlare
 from vcam_cli.effects.signal_chain import Limit
 
 SAMPLE = 1 << 14

@@ -11,7 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from vcam_cli.effects.base import PlaneTransfer, Zone, of_kind
+from vcam_cli.effects.base import of_kind
+from vcam_cli.effects.blurs import PlaneTransfer, Zone
 from vcam_cli.image_formation.transfer_tables import (
     LARGEST_PLANE,
     PARITIES,

@@ -23,7 +23,8 @@ import scipy.fft
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import pixel_centers
-from vcam_cli.effects.base import Blur, Effect, of_kind
+from vcam_cli.effects.base import Effect, of_kind
+from vcam_cli.effects.blurs import Blur
 from vcam_cli.image_formation.optical_path import Layer, Layers, OpticalPath, SpectrumReport
 from vcam_cli.parallel import product
 from vcam_cli.scenes.closed_form import Profile

@@ -20,7 +20,8 @@ import numpy as np
 
 from vcam_cli import memory
 from vcam_cli.arrays import Array
-from vcam_cli.effects.base import Blur, FieldTransfer, SeparableTransfer, of_kind
+from vcam_cli.effects.base import of_kind
+from vcam_cli.effects.blurs import Blur, FieldTransfer, SeparableTransfer
 from vcam_cli.image_formation.box_average import box_averages, point_values
 from vcam_cli.image_formation.estimates import memory_model
 from vcam_cli.image_formation.estimates.bandwidth import (

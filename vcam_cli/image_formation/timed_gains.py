@@ -7,7 +7,8 @@ from dataclasses import replace
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
-from vcam_cli.effects.base import Effect, SignalLevels, TemporalGain, of_kind
+from vcam_cli.effects.base import Effect, SignalLevels, of_kind
+from vcam_cli.effects.pixel_signal import TemporalGain
 from vcam_cli.image_formation.light_plan import OMITTED_SHARE, LightPlan
 
 

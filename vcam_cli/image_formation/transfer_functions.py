@@ -20,7 +20,8 @@ from functools import cached_property
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.effects.base import Blur, Effect, PlaneTransfer, RadialTransfer, of_kind
+from vcam_cli.effects.base import Effect, of_kind
+from vcam_cli.effects.blurs import Blur, PlaneTransfer, RadialTransfer
 from vcam_cli.parallel import pieces, product
 from vcam_cli.spectra import Spectrum, pair_weights, photons
 

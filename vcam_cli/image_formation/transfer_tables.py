@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.effects.base import Blur, PlaneTransfer
+from vcam_cli.effects.blurs import Blur, PlaneTransfer
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.parallel import product
 

@@ -34,8 +34,9 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.lens_mapping import border
-from vcam_cli.effects.base import Effect, ImageMotion, Magnification, StillWarp, Warp, of_kind
+from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.temporal.sub_exposed_motion import SubExposedMotion
+from vcam_cli.effects.warps import ImageMotion, Magnification, StillWarp, Warp
 from vcam_cli.image_formation.estimates.bandwidth import highest_passed, margin, reach
 from vcam_cli.image_formation.optical_path import Layers, OpticalPath, SpectrumReport
 from vcam_cli.image_formation.strategies import image_layers

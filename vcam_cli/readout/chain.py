@@ -20,7 +20,8 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.electrical import Electrical
-from vcam_cli.effects.base import Effect, Transport, of_kind
+from vcam_cli.effects.base import Effect, of_kind
+from vcam_cli.effects.pixel_signal import Transport
 from vcam_cli.effects.signal_chain import NoiseSource, Quantizer, electron_effects, noise_sources
 from vcam_cli.readout.binned_readout import effects_in_readout
 from vcam_cli.readout.binning import BinningGroups

@@ -13,7 +13,8 @@ from functools import partial
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.effects.base import Charge, Effect, of_kind
+from vcam_cli.effects.base import Effect, of_kind
+from vcam_cli.effects.pixel_signal import Charge
 from vcam_cli.effects.signal_chain import (
     NoiseSource,
     Quantizer,

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from vcam_cli.effects.base import Gain, of_kind
+from vcam_cli.effects.base import of_kind
+from vcam_cli.effects.pixel_signal import Gain
 from vcam_cli.image_formation.pixel_response import axis_levels
 from vcam_cli.simulation.preparation import Prepared
 

@@ -11,16 +11,10 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.mosaic import Mosaic
-from vcam_cli.effects.base import (
-    Effect,
-    ImageMotion,
-    NeighborSharing,
-    SignalLevels,
-    TemporalGain,
-    Transport,
-    of_kind,
-)
+from vcam_cli.effects.base import Effect, SignalLevels, of_kind
+from vcam_cli.effects.pixel_signal import NeighborSharing, TemporalGain, Transport
 from vcam_cli.effects.signal_chain import Limit, NoiseSource, extreme_signal
+from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.floats import rms
 from vcam_cli.image_formation import half_images, photon_rate, pixelwise, timed_gains
 from vcam_cli.image_formation.light_plan import PERCENTILES, LightPlan

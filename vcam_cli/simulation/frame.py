@@ -10,7 +10,8 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.scene.sources import Layers
-from vcam_cli.effects.base import Gain, of_kind
+from vcam_cli.effects.base import of_kind
+from vcam_cli.effects.pixel_signal import Gain
 from vcam_cli.floats import own_float_errors
 from vcam_cli.image_formation import half_images, warps
 from vcam_cli.image_formation.pixel_response import axis_levels

@@ -27,8 +27,9 @@ from typing import Any
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.effects.base import Charge, Effect, Overflow, SignalLevels, Transport, of_kind
+from vcam_cli.effects.base import Effect, SignalLevels, of_kind
 from vcam_cli.effects.order import ORDER
+from vcam_cli.effects.pixel_signal import Charge, Overflow, Transport
 from vcam_cli.effects.signal_chain import (
     ElectronEffect,
     Limit,

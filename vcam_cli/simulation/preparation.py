@@ -14,8 +14,10 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import Electrical
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.mosaic import Mosaic
-from vcam_cli.effects.base import ImageMotion, Overflow, of_kind
+from vcam_cli.effects.base import of_kind
+from vcam_cli.effects.pixel_signal import Overflow
 from vcam_cli.effects.signal_chain import Limit, full_well
+from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.neighbor_sharing import Sharing
 from vcam_cli.image_formation.optical_path import SpectrumReport

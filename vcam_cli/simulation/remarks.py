@@ -12,8 +12,9 @@ from vcam_cli.camera.derived.camera_angles import camera_angles
 from vcam_cli.camera.processing import SHOWN
 from vcam_cli.camera.scene.scene_files import ImageFile
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES
-from vcam_cli.effects.base import ImageMotion, of_kind
+from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.readout_chain import SIGMAS
+from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.floats import own_float_errors
 from vcam_cli.image_formation.light_plan import BLURS
 from vcam_cli.scenes.base import ChartScene

@@ -8,15 +8,10 @@ from functools import partial
 
 from vcam_cli import memory
 from vcam_cli.arrays import Array
-from vcam_cli.effects.base import (
-    Effect,
-    ImageMotion,
-    NeighborSharing,
-    TemporalGain,
-    Transport,
-    of_kind,
-)
+from vcam_cli.effects.base import Effect, of_kind
+from vcam_cli.effects.pixel_signal import NeighborSharing, TemporalGain, Transport
 from vcam_cli.effects.signal_chain import SIGMAS, NoiseSource, full_well
+from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.errors import bad
 from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.estimates import bandwidth, memory_model

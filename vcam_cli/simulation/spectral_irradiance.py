@@ -27,8 +27,10 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.camera.simulation import Output
-from vcam_cli.effects.base import Blur, Gain, VeilingGlare, of_kind
+from vcam_cli.effects.base import of_kind
+from vcam_cli.effects.blurs import Blur
 from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
+from vcam_cli.effects.pixel_signal import Gain, VeilingGlare
 from vcam_cli.errors import bad
 from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.optical_path import Layer, OpticalPath

@@ -9,8 +9,9 @@ from functools import cached_property
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.readouts import has_several
-from vcam_cli.effects.base import Charge, Effect, Overflow, of_kind
+from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.order import ORDER
+from vcam_cli.effects.pixel_signal import Charge, Overflow
 from vcam_cli.effects.signal_chain import NoiseSource, Quantizer
 from vcam_cli.errors import Collector
 from vcam_cli.solve.merge import camera_merge

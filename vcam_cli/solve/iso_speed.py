@@ -14,7 +14,7 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.exposure import Exposure
-from vcam_cli.effects.base import Gain
+from vcam_cli.effects.pixel_signal import Gain
 from vcam_cli.errors import Path, bad
 from vcam_cli.image_formation.pixel_response import PixelResponse, axis_levels
 from vcam_cli.physics import readout

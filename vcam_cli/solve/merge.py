@@ -7,9 +7,10 @@ import numpy as np
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.readouts import Readout, readouts
-from vcam_cli.effects.base import Charge, Effect
+from vcam_cli.effects.base import Effect
 from vcam_cli.effects.noise.quantization import Quantization
 from vcam_cli.effects.order import ORDER
+from vcam_cli.effects.pixel_signal import Charge
 from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.effects.signal_chain import ElectronEffect, noise_sources
 from vcam_cli.readout.binning import ALONE

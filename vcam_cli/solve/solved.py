@@ -31,7 +31,8 @@ from vcam_cli.camera.sensor.adc import Adc
 from vcam_cli.camera.sensor.array import Binning
 from vcam_cli.camera.sensor.pixel import Pixel
 from vcam_cli.camera.simulation import Output, Seed
-from vcam_cli.effects.base import Gain, NeighborSharing, of_kind
+from vcam_cli.effects.base import of_kind
+from vcam_cli.effects.pixel_signal import Gain, NeighborSharing
 from vcam_cli.effects.readout_chain import dark_noise, electrical
 from vcam_cli.effects.signal_chain import Quantizer
 from vcam_cli.image_formation.neighbor_sharing import array_sharing

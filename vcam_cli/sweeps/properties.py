@@ -22,9 +22,10 @@ from vcam_cli.camera.derived.geometry import Geometry, geometry
 from vcam_cli.camera.derived.pixel_layout import detector
 from vcam_cli.camera.derived.process import process
 from vcam_cli.characterization.closed_form import directional_mtf
-from vcam_cli.effects.base import Effect, Gain, of_kind
+from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.optics.off_axis import OffAxis
 from vcam_cli.effects.pixel.pixel_vignetting import PixelVignetting
+from vcam_cli.effects.pixel_signal import Gain
 from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.errors import bad
 from vcam_cli.image_formation.pixel_response import scene_transfer

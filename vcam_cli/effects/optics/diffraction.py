@@ -16,7 +16,8 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import RadialTransfer, switched_off
+from vcam_cli.effects.base import switched_off
+from vcam_cli.effects.blurs import RadialTransfer
 from vcam_cli.physics import diffraction
 
 

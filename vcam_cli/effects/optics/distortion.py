@@ -19,7 +19,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.lens_mapping import border, lens_mapping
-from vcam_cli.effects.base import StillWarp
+from vcam_cli.effects.warps import StillWarp
 from vcam_cli.physics.distortion import Mapping
 
 INSIDE = (0.25, 0.5, 0.75, 1.0)

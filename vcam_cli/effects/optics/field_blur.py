@@ -16,7 +16,8 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.color_errors import WavelengthTable
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import FieldTransfer, SignalLevels, Zone
+from vcam_cli.effects.base import SignalLevels
+from vcam_cli.effects.blurs import FieldTransfer, Zone
 from vcam_cli.effects.optics.wavefront_blur import (
     GREEN,
     AberrationBlur,

@@ -17,7 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.effects.base import Effect, PlaneTransfer
+from vcam_cli.effects.base import Effect
+from vcam_cli.effects.blurs import PlaneTransfer
 from vcam_cli.effects.optics.wavefront_blur import AberrationBlur
 
 LEFT, RIGHT = 1, -1
@@ -92,5 +93,5 @@ def halved(effects: Iterable[Effect], radius: float, half: int) -> tuple[Effect,
     tuple of Effect
         The same, defocus by half a pupil in place of aberrations.
     """
-    kept = tuple(effect for effect in effects if not isinstance(effect, AberrationBlur))
+    kept = tuple(part for effect in effects for part in effect.seen_by_half_pupil())
     return kept if abs(radius) < LEAST else (HalfPupil(radius, half), *kept)

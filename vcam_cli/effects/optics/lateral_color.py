@@ -18,7 +18,7 @@ from vcam_cli.camera.color_errors import WavelengthTable
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.prescription import lateral_color as traced_lateral_color
 from vcam_cli.camera.derived.prescription import sensor_view, traced_lens
-from vcam_cli.effects.base import Magnification
+from vcam_cli.effects.warps import Magnification
 
 
 @dataclass(frozen=True)

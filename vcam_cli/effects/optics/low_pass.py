@@ -21,7 +21,8 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import Effect, PlaneTransfer, SeparableTransfer
+from vcam_cli.effects.base import Effect
+from vcam_cli.effects.blurs import PlaneTransfer, SeparableTransfer
 
 Vectors = tuple[tuple[float, float], ...]
 

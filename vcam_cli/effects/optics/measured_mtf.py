@@ -16,7 +16,8 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.lens_mtf import MtfAtHeight, MtfCurve, lens_mtf
-from vcam_cli.effects.base import FieldTransfer, RadialTransfer, SignalLevels, Zone
+from vcam_cli.effects.base import SignalLevels
+from vcam_cli.effects.blurs import FieldTransfer, RadialTransfer, Zone
 from vcam_cli.effects.optics.field_blur import ZoneWeight
 from vcam_cli.effects.optics.wavefront_blur import GREEN, AberrationBlur
 from vcam_cli.physics import diffraction

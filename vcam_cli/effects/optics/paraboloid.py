@@ -10,7 +10,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import RadialTransfer
+from vcam_cli.effects.blurs import RadialTransfer
 from vcam_cli.physics.aberration import paraboloid_transfer
 
 

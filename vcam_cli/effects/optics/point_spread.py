@@ -14,7 +14,8 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import PlaneTransfer, SignalLevels
+from vcam_cli.effects.base import SignalLevels
+from vcam_cli.effects.blurs import PlaneTransfer
 from vcam_cli.effects.optics.wavefront_blur import AberrationBlur, largest_loss
 from vcam_cli.physics.cache import ByteCache
 

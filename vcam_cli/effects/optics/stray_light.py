@@ -12,7 +12,8 @@ from typing import Self
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import SignalLevels, VeilingGlare
+from vcam_cli.effects.base import SignalLevels
+from vcam_cli.effects.pixel_signal import VeilingGlare
 
 
 @dataclass(frozen=True)

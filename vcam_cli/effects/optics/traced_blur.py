@@ -24,13 +24,8 @@ from vcam_cli.camera.derived.prescription import (
     traced_lens,
     wavefronts,
 )
-from vcam_cli.effects.base import (
-    FieldTransfer,
-    PlaneTransfer,
-    SignalLevels,
-    Zone,
-    switched_off,
-)
+from vcam_cli.effects.base import SignalLevels, switched_off
+from vcam_cli.effects.blurs import FieldTransfer, PlaneTransfer, Zone
 from vcam_cli.effects.optics.field_blur import ZoneWeight
 from vcam_cli.effects.optics.wavefront_blur import GREEN, AberrationBlur, largest_loss
 from vcam_cli.lenses.fields import View

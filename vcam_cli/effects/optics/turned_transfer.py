@@ -10,7 +10,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import PlaneTransfer, SeparableTransfer
+from vcam_cli.effects.blurs import PlaneTransfer, SeparableTransfer
 
 
 @dataclass(frozen=True)

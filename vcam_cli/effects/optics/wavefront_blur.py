@@ -17,7 +17,8 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.color_errors import WavelengthTable
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import Effect, PlaneTransfer, RadialTransfer, SignalLevels, switched_off
+from vcam_cli.effects.base import Effect, SignalLevels, switched_off
+from vcam_cli.effects.blurs import PlaneTransfer, RadialTransfer
 from vcam_cli.physics import aberration, diffraction, ray_blur, zernike
 from vcam_cli.physics.cache import ByteCache
 from vcam_cli.physics.zernike import Terms
@@ -37,6 +38,10 @@ class AberrationBlur(Effect):
     reference = "Hopkins 1955, doi:10.1098/rspa.1955.0158; Noll 1976, doi:10.1364/JOSA.66.000207"
     absent = "optics has no defocus, focus_shift, zernike, psf or mtf"
     origin = "lens"
+
+    def seen_by_half_pupil(self) -> tuple[Effect, ...]:
+        """Return nothing: defocus by half a pupil (`half_pupil.py`) takes the place of it."""
+        return ()
 
 
 @dataclass(frozen=True)

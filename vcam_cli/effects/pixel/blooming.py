@@ -18,7 +18,8 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import circuit
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import Overflow, SignalLevels
+from vcam_cli.effects.base import SignalLevels
+from vcam_cli.effects.pixel_signal import Overflow
 from vcam_cli.errors import bad
 
 

@@ -16,7 +16,8 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import SignalLevels, Transport
+from vcam_cli.effects.base import SignalLevels
+from vcam_cli.effects.pixel_signal import Transport
 
 REST = 1e-9
 """Share of a packet that may be deferred further than is followed; it is lost."""

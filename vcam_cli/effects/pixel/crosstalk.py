@@ -19,7 +19,8 @@ from typing import Self
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.sensor.crosstalk import Kernel, Kernels
-from vcam_cli.effects.base import NeighborSharing, SignalLevels
+from vcam_cli.effects.base import SignalLevels
+from vcam_cli.effects.pixel_signal import NeighborSharing
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,8 @@ from typing import Self
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.dark_current import dark_rate
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import Charge, SignalLevels
+from vcam_cli.effects.base import SignalLevels
+from vcam_cli.effects.pixel_signal import Charge
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,8 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import Gain, SignalLevels
+from vcam_cli.effects.base import SignalLevels
+from vcam_cli.effects.pixel_signal import Gain
 
 
 @dataclass(frozen=True)

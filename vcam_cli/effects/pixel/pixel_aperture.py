@@ -16,7 +16,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import SeparableTransfer
+from vcam_cli.effects.blurs import SeparableTransfer
 from vcam_cli.effects.optics.turned_transfer import TurnedTransfer
 
 

@@ -27,7 +27,8 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived import pixel_layout
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import Gain, SignalLevels
+from vcam_cli.effects.base import SignalLevels
+from vcam_cli.effects.pixel_signal import Gain
 from vcam_cli.floats import rms
 from vcam_cli.physics import vignetting
 

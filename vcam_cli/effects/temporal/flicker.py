@@ -16,7 +16,8 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.line_times import LineTimes, line_times
 from vcam_cli.camera.scene.illuminant import FlickerSpec
-from vcam_cli.effects.base import SignalLevels, TemporalGain
+from vcam_cli.effects.base import SignalLevels
+from vcam_cli.effects.pixel_signal import TemporalGain
 from vcam_cli.physics import flicker
 
 

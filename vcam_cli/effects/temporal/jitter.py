@@ -15,7 +15,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import RadialTransfer
+from vcam_cli.effects.blurs import RadialTransfer
 
 REACH = 4.0
 """Standard deviations within which almost all of the light stays: all but 3e-4 of it."""

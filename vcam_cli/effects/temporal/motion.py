@@ -23,8 +23,10 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.image_motion import ExposedMotion, exposed_motion
-from vcam_cli.effects.base import Effect, ImageMotion, PlaneTransfer, SeparableTransfer
+from vcam_cli.effects.base import Effect
+from vcam_cli.effects.blurs import PlaneTransfer, SeparableTransfer
 from vcam_cli.effects.temporal.sub_exposed_motion import SubExposedMotion
+from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.physics.motion_blur import path_transfer
 
 

@@ -16,7 +16,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.image_motion import ExposedMotion
-from vcam_cli.effects.base import ImageMotion
+from vcam_cli.effects.warps import ImageMotion
 
 PLACES = 5
 """Places along each side of the sensor at which motion is looked at for the plan."""

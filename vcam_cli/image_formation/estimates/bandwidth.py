@@ -20,7 +20,9 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
-from vcam_cli.effects.base import Effect, ImageMotion, RadialTransfer, of_kind
+from vcam_cli.effects.base import Effect, of_kind
+from vcam_cli.effects.blurs import RadialTransfer
+from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.settings import Settings

@@ -22,7 +22,7 @@ import scipy.fft
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import pixel_centers
-from vcam_cli.effects.base import Blur
+from vcam_cli.effects.blurs import Blur
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.scenes.base import ChartScene, Scene
 from vcam_cli.scenes.charts.slanted_edge import half_plane_cover

@@ -11,7 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.effects.base import Effect, FieldTransfer, PlaneTransfer, RadialTransfer, of_kind
+from vcam_cli.effects.base import Effect, of_kind
+from vcam_cli.effects.blurs import FieldTransfer, PlaneTransfer, RadialTransfer
 from vcam_cli.image_formation.estimates.scene_sampling import SampledImage
 from vcam_cli.image_formation.field_dependence import Mode
 from vcam_cli.image_formation.optical_path import OpticalPath

@@ -11,17 +11,9 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import (
-    Blur,
-    Effect,
-    FieldTransfer,
-    Magnification,
-    PlaneTransfer,
-    SeparableTransfer,
-    StillWarp,
-    Warp,
-    of_kind,
-)
+from vcam_cli.effects.base import Effect, of_kind
+from vcam_cli.effects.blurs import Blur, FieldTransfer, PlaneTransfer, SeparableTransfer
+from vcam_cli.effects.warps import Magnification, StillWarp, Warp
 from vcam_cli.image_formation.estimates.bandwidth import FREQUENCY_SHARE, highest_passed, reach
 from vcam_cli.image_formation.estimates.chart_cells import (
     SURE,

@@ -9,7 +9,8 @@ import math
 from collections.abc import Sequence
 
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import PlaneTransfer, of_kind
+from vcam_cli.effects.base import of_kind
+from vcam_cli.effects.blurs import PlaneTransfer
 from vcam_cli.image_formation.estimates.bandwidth import axes
 from vcam_cli.image_formation.far_field import FarPart
 from vcam_cli.image_formation.field_dependence import ring_entries

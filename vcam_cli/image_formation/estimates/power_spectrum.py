@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.effects.base import SeparableTransfer
+from vcam_cli.effects.blurs import SeparableTransfer
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.scene_spectrum import SceneSpectrum, pairs
 from vcam_cli.image_formation.transfer_tables import Tables, reader

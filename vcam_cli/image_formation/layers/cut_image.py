@@ -23,7 +23,8 @@ import numpy as np
 from vcam_cli import memory
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.mosaic import Mosaic
-from vcam_cli.effects.base import Blur, SeparableTransfer, of_kind
+from vcam_cli.effects.base import of_kind
+from vcam_cli.effects.blurs import Blur, SeparableTransfer
 from vcam_cli.effects.optics.paraboloid import Paraboloid
 from vcam_cli.effects.optics.wavefront_blur import AberrationBlur
 from vcam_cli.image_formation.layers.layered import PART, gathered, is_of_lens

@@ -13,8 +13,9 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
-from vcam_cli.effects.base import ImageMotion, of_kind
+from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.temporal.motion import EvenMotion
+from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.image_formation.layers.ray_cells import BORDER, Window
 from vcam_cli.image_formation.optical_path import LayerOptics
 from vcam_cli.scenes.layered import LayerChart

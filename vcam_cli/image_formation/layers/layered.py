@@ -23,14 +23,9 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.camera.derived.mosaic import Mosaic
-from vcam_cli.effects.base import (
-    Blur,
-    Effect,
-    FieldTransfer,
-    ImageMotion,
-    SeparableTransfer,
-    of_kind,
-)
+from vcam_cli.effects.base import Effect, of_kind
+from vcam_cli.effects.blurs import Blur, FieldTransfer, SeparableTransfer
+from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.floats import rms
 from vcam_cli.image_formation.estimates.bandwidth import margin
 from vcam_cli.image_formation.layers.layer_edges import (

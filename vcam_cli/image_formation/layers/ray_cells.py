@@ -10,7 +10,8 @@ import scipy.fft
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
-from vcam_cli.effects.base import Blur, SeparableTransfer, of_kind
+from vcam_cli.effects.base import of_kind
+from vcam_cli.effects.blurs import Blur, SeparableTransfer
 from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.transfer_functions import Transfer

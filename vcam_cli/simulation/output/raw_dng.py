@@ -22,8 +22,10 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.derived.mosaic import BLOCKS
-from vcam_cli.effects.base import Gain, StillWarp, of_kind
+from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.noise.quantization import Quantization
+from vcam_cli.effects.pixel_signal import Gain
+from vcam_cli.effects.warps import StillWarp
 from vcam_cli.errors import bad
 from vcam_cli.files.images.dng import (
     LEAST_SIZE,

@@ -1,0 +1,336 @@
+"""Kinds of effects that blur: transfer functions of the spatial frequency.
+
+Transfer functions multiply, so their order does not matter. Of a point spread function h, which
+sums to 1, H(f) = integral h(x) exp(-2 pi i f x) dx has H(0) = 1 and no magnitude above 1.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from vcam_cli.arrays import Array
+from vcam_cli.effects.base import Effect
+
+PLACES = 3
+"""Places of the field over which the contrast of a blur that changes over it is averaged."""
+SPREAD_RANGE, SPREAD_STEPS = (1e2, 1e8), 96
+"""Frequencies at which the spread of a blur is sought [cycles/m]: no blur of a camera is wider than
+a sensor or counts when it is narrower than a wave of light."""
+
+
+class Blur(Effect):
+    """A transfer function of the spatial frequency and the wavelength, in one place of the field.
+
+    Two kinds differ in what they depend on: `RadialTransfer` and `PlaneTransfer`. Its transfer
+    function is smooth over frequencies much smaller than the inverse of its `reach`.
+    """
+
+    @abstractmethod
+    def cutoff(self, wavelength: float) -> float:
+        """Return the frequency from which the transfer is zero.
+
+        Parameters
+        ----------
+        wavelength : float
+            Wavelength [m].
+
+        Returns
+        -------
+        float
+            Frequency [cycles/m]; inf where there is no such frequency.
+        """
+
+    @abstractmethod
+    def otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
+        """Return the transfer at all pairs of frequencies. It is 1 at frequency 0.
+
+        Parameters
+        ----------
+        fx, fy : Array
+            Frequencies (n,) along x and (m,) along y [cycles/m].
+        wavelength : float
+            Wavelength [m].
+
+        Returns
+        -------
+        Array
+            Transfer (m, n) without unit, complex where the blur is not symmetric.
+        """
+
+    def spread(self, wavelengths: Array) -> Array:
+        """Return a bound (J,) on |1 - H(f)| / (2 pi |f|) at wavelengths (J,) [m]; inf: none known.
+
+        A blur without one is never left out.
+        """
+        return np.full(len(wavelengths), np.inf)
+
+    def largest(self, frequency: Array, wavelength: float) -> Array:
+        """Return a bound on the contrast of waves in any direction.
+
+        Parameters
+        ----------
+        frequency : Array
+            Spatial frequencies (n,) [cycles/m].
+        wavelength : float
+            Wavelength [m].
+
+        Returns
+        -------
+        Array
+            Bound (n,) without unit; 1 where no lower bound is known.
+        """
+        return np.ones(frequency.shape)
+
+    def kept_bytes(self, wavelengths: Array, by_harmonics: bool = False) -> int:
+        """Return the memory that its transfer takes beside tables.
+
+        Parameters
+        ----------
+        wavelengths : Array
+            Wavelengths (J,) [m].
+        by_harmonics : bool, optional
+            Whether only the harmonics of the direction are needed, not planes.
+
+        Returns
+        -------
+        int
+            Memory [bytes].
+        """
+        return 0
+
+    def otf_along(
+        self, frequency: Array, across: tuple[float, float], wavelength: float
+    ) -> Array | None:
+        """Return the transfer of waves in one direction, or None where it is not known by itself.
+
+        Parameters
+        ----------
+        frequency : Array
+            Spatial frequencies (n,) [cycles/m].
+        across : tuple of float
+            Unit vector (x, y) along which the waves change.
+        wavelength : float
+            Wavelength [m].
+
+        Returns
+        -------
+        Array or None
+            Transfer (n,), complex where the blur is not symmetric.
+        """
+        return None
+
+    def row_transfer(self, frequency: Array, wavelength: float) -> Array:
+        """Return the contrast (n,) that it leaves of waves along a row."""
+        contrast: Array = np.abs(self.otf_plane(frequency, np.zeros(1), wavelength)[0])
+        return contrast
+
+
+class RadialTransfer(Blur):
+    """A transfer function that depends on the length of the spatial frequency only."""
+
+    is_even = True
+
+    @abstractmethod
+    def otf(self, frequency: Array, wavelength: float) -> Array:
+        """Return the transfer at spatial frequencies.
+
+        Parameters
+        ----------
+        frequency : Array
+            Lengths of the frequencies, of any shape [cycles/m].
+        wavelength : float
+            Wavelength [m].
+
+        Returns
+        -------
+        Array
+            Transfer without unit, in the shape of `frequency`; 1 at frequency 0.
+        """
+
+    def spectral_otf(self, frequency: Array, wavelengths: Array) -> Array:
+        """Return the transfer at every wavelength.
+
+        Parameters
+        ----------
+        frequency : Array
+            Lengths of the frequencies, of any shape [cycles/m].
+        wavelengths : Array
+            Wavelengths (J,) [m].
+
+        Returns
+        -------
+        Array
+            Transfer (J, *shape of `frequency`) without unit.
+        """
+        return np.array([self.otf(frequency, float(w)) for w in wavelengths])
+
+    def otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
+        """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: (m, n)."""
+        return self.otf(np.hypot(fx[None, :], fy[:, None]), wavelength)
+
+    def spread(self, wavelengths: Array) -> Array:
+        """Return a bound (J,) on |1 - H(f)| / (2 pi |f|) at wavelengths (J,) [m]."""
+        return np.array(_radial_spread(self, tuple(wavelengths.tolist())))
+
+    def largest(self, frequency: Array, wavelength: float) -> Array:
+        """Return the contrast (n,), which is that of all directions."""
+        return np.abs(self.otf(frequency, wavelength))
+
+    def otf_along(self, frequency: Array, across: tuple[float, float], wavelength: float) -> Array:
+        """Return the transfer (n,) of waves in one direction, which is that of all."""
+        return self.otf(np.abs(frequency), wavelength)
+
+
+@lru_cache(maxsize=64)
+def _radial_spread(blur: RadialTransfer, wavelengths: tuple[float, ...]) -> tuple[float, ...]:
+    """Return the largest loss over 2 pi f, at frequencies apart by a factor.
+
+    That factor bounds it between them, as losses grow until nothing is left.
+    """
+    frequency = np.geomspace(*SPREAD_RANGE, SPREAD_STEPS)
+    factor = frequency[1] / frequency[0]
+    otf = blur.spectral_otf(frequency, np.array(wavelengths))
+    return tuple((factor * np.abs(1 - otf) / (2 * np.pi * frequency)).max(axis=1).tolist())
+
+
+class PlaneTransfer(Blur):
+    """A transfer function of both components of the spatial frequency.
+
+    Complex where it is not symmetric about a point: H(-f) = conj(H(f)), with the sign of
+    integral h(x, y) exp(-2 pi i (fx x + fy y)) dx dy, x to the right and y down.
+    """
+
+    def harmonics(self, frequency: Array, wavelengths: Array) -> Array:
+        """Return the transfer as harmonics of the direction; `pupil_harmonics` defines them.
+
+        Blurs of a `FieldTransfer` have them: they are turned with the azimuth.
+
+        Parameters
+        ----------
+        frequency : Array
+            Frequencies (n,) in even steps from 0 [cycles/m].
+        wavelengths : Array
+            Wavelengths (J,) [m].
+
+        Returns
+        -------
+        Array
+            Complex harmonics A_m (J, n, m) without unit.
+
+        Raises
+        ------
+        TypeError
+            For a blur that has no harmonics.
+        """
+        raise TypeError(f"{type(self).__name__} has no harmonics of the direction")
+
+
+@dataclass(frozen=True)
+class Zone:
+    """A blur, and how much of it there is in every place of the sensor."""
+
+    blur: Blur
+    weight: Callable[[Array, Array], Array]
+    """At the positions x (columns,), y (rows,) [m]: (rows, columns)."""
+
+
+class FieldTransfer(Effect):
+    """A transfer function that changes slowly over the field: a sum of few, weighted by place.
+
+    The lens is symmetric about its axis: what it does on the half-axis from the center to the right
+    it does elsewhere turned with the azimuth. A camera has at most one of the kind.
+    """
+
+    @abstractmethod
+    def rings(self, count: int) -> tuple[Zone, ...]:
+        """Return blurs on that half-axis, whose weights sum to 1 in every place.
+
+        All are `RadialTransfer`, or all are `PlaneTransfer`.
+
+        Parameters
+        ----------
+        count : int
+            Number of places from center to corner; a field that needs more has more.
+
+        Returns
+        -------
+        tuple of Zone
+            Blurs with their weights over the field.
+        """
+
+    def zones(self, count: int) -> tuple[Zone, ...]:
+        """Return blurs that are turned already, whose weights sum to 1 in every place.
+
+        Parameters
+        ----------
+        count : int
+            Number of places from center to corner, as in `rings`.
+
+        Returns
+        -------
+        tuple of Zone
+            Blurs with their weights over the field.
+        """
+        return self.rings(count)
+
+    @property
+    def is_uniform(self) -> bool:
+        """No: it blurs places of the field each by itself."""
+        return False
+
+    def row_transfer(self, frequency: Array, wavelength: float) -> Array:
+        """Return the contrast (n,) that it leaves of waves along a row, rms over some zones."""
+        zones = self.zones(PLACES)
+        some = [zone.blur for zone in zones[:: max(1, len(zones) // PLACES)]]
+        contrast: Array = np.sqrt(
+            np.mean([blur.row_transfer(frequency, wavelength) ** 2 for blur in some], 0)
+        )
+        return contrast
+
+
+class SeparableTransfer(Effect):
+    """A transfer function that is a product of one along x and one along y."""
+
+    @property
+    def box(self) -> tuple[float, float] | None:
+        """Width and height of the area that it averages over evenly [m]; None for another shape."""
+        return None
+
+    def row_transfer(self, frequency: Array, wavelength: float) -> Array:
+        """Return the contrast (n,) that it leaves of waves along a row."""
+        return np.abs(self.along_x(frequency))
+
+    @abstractmethod
+    def along_x(self, frequency: Array) -> Array:
+        """Return the transfer along x.
+
+        Parameters
+        ----------
+        frequency : Array
+            Frequencies along x (n,) [cycles/m].
+
+        Returns
+        -------
+        Array
+            Transfer (n,) without unit.
+        """
+
+    @abstractmethod
+    def along_y(self, frequency: Array) -> Array:
+        """Return the transfer along y.
+
+        Parameters
+        ----------
+        frequency : Array
+            Frequencies along y (n,) [cycles/m].
+
+        Returns
+        -------
+        Array
+            Transfer (n,) without unit.
+        """
