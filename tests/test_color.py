@@ -116,8 +116,7 @@ def test_gray_is_neutral_after_white_balance(colour, lamp, balance):
 @pytest.mark.parametrize(("name", "gain"), [("still-life", 4.0), ("colorchecker-d65", 5.0)])
 def test_edge_aware_comes_closer_to_the_picture_than_bilinear(name, gain):
     """PSNR [dB] of a mosaic of the scene sampled at the pixels' centers; measured: 5.3 and 8.2."""
-    from vcam_cli.processing.demosaic import bilinear
-    from vcam_cli.processing.edge_aware import edge_aware
+    from demosaiced import bilinear, edge_aware
 
     frame = simulate(load(name, ["quality=[]"]), workers=1).frame
     white = frame.white_dn - frame.black_dn

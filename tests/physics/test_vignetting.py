@@ -28,6 +28,11 @@ sides = st.floats(0.5e-6, 20e-6)
 # --- surfaces ------------------------------------------------------------------------------------
 
 
+def shift_of(tangent, layers):
+    """How far light falls sideways on its way down [m], by the tangent of its angle in air."""
+    return tangent * v.depth_per_tangent(np.square(tangent), layers)
+
+
 def test_refraction_at_thirty_degrees():
     """sin 30 / 2 = 1/4: the cosine behind it is sqrt(15) / 4."""
     inside = v.refracted_cosine(math.cos(math.pi / 6), 1.0, 2.0)
@@ -118,7 +123,7 @@ def test_the_shift_is_that_of_snells_law(tangent, upper, lower):
     sine = math.sin(math.atan(tangent))
     angles = [math.asin(sine / n) for n in (upper, lower)]
     expected = 0.7 * math.tan(angles[0]) + 4 * math.tan(angles[1])
-    shift = v.lateral_shift(tangent, ((0.7, upper), (4.0, lower)))
+    shift = shift_of(tangent, ((0.7, upper), (4.0, lower)))
     assert shift == pytest.approx(expected, rel=1e-12, abs=1e-300)
 
 
@@ -139,7 +144,7 @@ def test_a_plane_wave_loses_what_the_thesis_says(case):
     passes = v.stack_transmission(math.cos(math.radians(case["theta_deg"])), tunnel)
     assert passes == pytest.approx(case["TpTs_unpol"], rel=1e-13)
     inside = math.radians(case["theta_s_deg"])
-    seen = v.overlap(v.lateral_shift(tangent, tunnel), 0.0, case["w"], case["w"])
+    seen = v.overlap(shift_of(tangent, tunnel), 0.0, case["w"], case["w"])
     assert passes * seen * math.cos(inside) == pytest.approx(case["thesis_factor"], rel=1e-13)
 
 
@@ -228,7 +233,7 @@ def test_the_stated_error_of_the_quadrature(f_number, chief_centered, monkeypatc
     monkeypatch.setattr(v, "POINTS_ALONG", 20)
     many = v.collected_fraction(*case)
     assert np.abs(few - many).max() < 5e-5
-    lit = (v.lateral_shift(at + 1 / (2 * f_number), STACK) < 1.8e-6) & (not chief_centered)
+    lit = (shift_of(at + 1 / (2 * f_number), STACK) < 1.8e-6) & (not chief_centered)
     whole = lit & lit[:, None]
     assert np.all(np.abs(few - many)[whole] < 2e-7)
 
@@ -288,7 +293,7 @@ def test_a_narrow_cone_is_a_plane_wave():
     tangent = 0.3
     share = v.collected_fraction(tangent, 0.1, 5e-4, STACK, 3e-6, 3e-6)
     u = math.hypot(tangent, 0.1)
-    depth = v.lateral_shift(u, STACK) / u
+    depth = shift_of(u, STACK) / u
     seen = (1 - depth * tangent / 3e-6) * (1 - depth * 0.1 / 3e-6)
     expected = seen * v.stack_transmission(1 / math.hypot(1, u), STACK)
     assert share == pytest.approx(expected, rel=1e-6)

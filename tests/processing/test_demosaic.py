@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 from colour_demosaicing import demosaicing_CFA_Bayer_bilinear
+from demosaiced import bilinear
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from vcam_cli.processing.base import Block, mirrored_index
-from vcam_cli.processing.demosaic import Bilinear, bilinear, is_bayer
+from vcam_cli.processing.demosaic import Bilinear, is_bayer
 
 RGB = ("R", "G", "B")
 ORDERS = ("RGGB", "GRBG", "GBRG", "BGGR")

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from demosaiced import bilinear, edge_aware
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from vcam_cli.processing.base import Block, mirrored_index
-from vcam_cli.processing.demosaic import bilinear
-from vcam_cli.processing.edge_aware import REACH, EdgeAware, edge_aware
+from vcam_cli.processing.edge_aware import REACH, EdgeAware
 
 RGB = ("R", "G", "B")
 ORDERS = ("RGGB", "GRBG", "GBRG", "BGGR")

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from demosaiced import bilinear
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vcam_cli.processing.base import padded_block
-from vcam_cli.processing.demosaic import bilinear
 from vcam_cli.processing.normalized_convolution import (
     NormalizedConvolution,
     Sites,

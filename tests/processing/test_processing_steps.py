@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from demosaiced import bilinear
 
 from vcam_cli.errors import BadInput
 from vcam_cli.processing import Context, check, process, tone
-from vcam_cli.processing.demosaic import bilinear
 
 RGB = ("R", "G", "B")
 RGGB = (("R", "G"), ("G", "B"))

@@ -75,9 +75,13 @@ def test_range_and_threshold(found):
 def test_signal_to_noise_is_that_of_the_model(found):
     """Eq 20 against eq 21: a level's noise is good to sqrt(1 / (2 pixels)) = 0.24 %."""
     inside = found.series.photons < 0.85 * found.saturation_photons
-    model = found.snr_model(found.series.photons[inside])
-    assert np.abs(found.series.snr[inside] / model - 1).max() < 0.02
-    assert float(found.snr_model(found.threshold_photons)) == pytest.approx(1, rel=1e-12)
+
+    def model(photons):  # 1/12: variance of rounding
+        e = found.quantum_efficiency * photons
+        return e / np.sqrt(found.dark_noise**2 + 1 / 12 / found.gain**2 + e)
+
+    assert np.abs(found.series.snr[inside] / model(found.series.photons[inside]) - 1).max() < 0.02
+    assert model(found.threshold_photons) == pytest.approx(1, rel=1e-12)
     e = 0.25 * WELL
     assert found.measured_snr(e) == pytest.approx(e / math.sqrt(e + DARK_NOISE**2), rel=0.015)
 

@@ -66,11 +66,6 @@ class Warp(Effect):
         """
 
     @property
-    def changes_with_time(self) -> bool:
-        """Whether it is another one at other times."""
-        return False
-
-    @property
     @abstractmethod
     def travel(self) -> float:
         """How far from its place light comes to lie [m]."""
@@ -180,11 +175,6 @@ class ImageMotion(Warp):
     @abstractmethod
     def displacement(self) -> tuple[float, float]:
         """Displacement of the image in the array's middle, along x and y [m]."""
-
-    @property
-    def changes_with_time(self) -> bool:
-        """Yes."""
-        return True
 
     def spread(self, wavelengths: Array) -> Array:
         """Return a bound (J,) on |1 - H(f)| / (2 pi |f|): no light moves further [m]."""

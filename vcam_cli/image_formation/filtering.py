@@ -33,8 +33,6 @@ SHORTEST = 8
 
 Waves = tuple[bool, bool]
 """Whether waves along x, and along y, are sines."""
-Share = tuple[bool, Array | None]
-"""Waves of the pixels, and what part of every term they are; None for all of it."""
 
 
 @dataclass(frozen=True)

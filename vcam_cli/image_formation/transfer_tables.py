@@ -98,13 +98,6 @@ class Tables:
         """Number of colors."""
         return self.shape[1]
 
-    @property
-    def brightest_color(self) -> int:
-        """Index of the color that has most of the light that is the same all over."""
-        if self.radial is None:
-            return 0
-        return int(np.abs(self.radial[..., 0]).sum(axis=0).argmax())
-
     def of_color(self, color: int) -> Tables:
         """Return the tables of a single color.
 

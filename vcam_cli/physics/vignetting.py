@@ -178,25 +178,6 @@ def depth_per_tangent(tangent_squared: ArrayLike, layers: Layers) -> Floats:
     ]
 
 
-def lateral_shift(tangent: ArrayLike, layers: Layers) -> Floats:
-    """Return how far light falls sideways on its way down, along its azimuth.
-
-    Parameters
-    ----------
-    tangent : array_like
-        tan(theta) of the angle in air [dimensionless].
-    layers : Layers
-        Thickness [m] and refractive index of each layer from the air down.
-
-    Returns
-    -------
-    ndarray
-        Lateral shift [m], in the shape of `tangent`.
-    """
-    u = np.asarray(tangent, np.float64)
-    return (u * depth_per_tangent(u**2, layers))[()]
-
-
 def overlap(dx: ArrayLike, dy: ArrayLike, width: float, height: float) -> Floats:
     """Return the share that two equal rectangles have in common when one is shifted.
 

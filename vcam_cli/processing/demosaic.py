@@ -39,27 +39,6 @@ def is_bayer(pattern: Pattern) -> bool:
     return (a == d or b == c) and len({a, b, c, d}) == 3
 
 
-def bilinear(mosaic: np.ndarray, pattern: Pattern, colors: tuple[str, ...]) -> np.ndarray:
-    """Return all colors of a Bayer mosaic by bilinear interpolation [1].
-
-    Parameters
-    ----------
-    mosaic : ndarray
-        Values (rows, columns), at least 2 x 2.
-    pattern : Pattern
-        Block of 2 x 2 color names that starts at pixel (0, 0).
-    colors : tuple of str
-        Order of the planes.
-
-    Returns
-    -------
-    ndarray
-        Planes (C, rows, columns), float32.
-    """
-    rows = mirrored_index(np.arange(-1, mosaic.shape[0] + 1), mosaic.shape[0])
-    return bilinear_rows(mosaic[rows].astype(np.float32), pattern, colors)
-
-
 def bilinear_rows(mosaic: np.ndarray, pattern: Pattern, colors: tuple[str, ...]) -> np.ndarray:
     """Return all colors of rows whose first and last only serve as neighbors.
 

@@ -40,32 +40,6 @@ FLAT_ROUGHNESS = 1e-3
 """Roughness, as a share of white, below which a direction is not smooth but flat."""
 
 
-def edge_aware(
-    mosaic: np.ndarray, pattern: Pattern, colors: tuple[str, ...], white: np.ndarray
-) -> np.ndarray:
-    """Return all colors of a Bayer mosaic, interpolated along edges.
-
-    Parameters
-    ----------
-    mosaic : ndarray
-        Values (rows, columns), at least 2 x 2.
-    pattern : Pattern
-        Block of 2 x 2 color names that starts at pixel (0, 0).
-    colors : tuple of str
-        Order of the planes.
-    white : ndarray
-        Signal of a perfect white in each color (C,), in the unit of the mosaic.
-
-    Returns
-    -------
-    ndarray
-        Planes (C, rows, columns), float32.
-    """
-    rows = mirrored_index(np.arange(-REACH, mosaic.shape[0] + REACH), mosaic.shape[0])
-    method = EdgeAware(pattern, colors, tuple(float(w) for w in white))
-    return method.process_block(Block(mosaic[rows].astype(np.float32)[np.newaxis], -REACH)).planes
-
-
 @dataclass(frozen=True)
 class EdgeAware:
     """Takes blocks of a Bayer mosaic to full color along edges."""

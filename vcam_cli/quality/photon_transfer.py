@@ -156,22 +156,6 @@ class PhotonTransfer:
         """Dynamic range mu_p.sat / mu_p.min, eq 28 of [1]."""
         return self.saturation_photons / self.threshold_photons
 
-    def snr_model(self, photons: ArrayLike) -> Floats:
-        """Return the signal-to-noise ratio of the linear model, eq 21 of [1].
-
-        Parameters
-        ----------
-        photons : array_like
-            Photons on a pixel in the exposure.
-
-        Returns
-        -------
-        ndarray
-            Ratio of signal to noise [dimensionless], in the shape of `photons`.
-        """
-        e = self.quantum_efficiency * np.asarray(photons, dtype=np.float64)
-        return e / np.sqrt(self.dark_noise**2 + ROUNDING / self.gain**2 + e)
-
     def measured_snr(self, electrons: float) -> float:
         """Return the measured signal-to-noise ratio at a signal, log-log between two levels.
 

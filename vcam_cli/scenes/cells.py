@@ -4,11 +4,6 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 
-GOLDEN = 0.6180339887498949
-"""Inverse golden ratio, which no fraction of small numbers comes near."""
-EVEN = (0.7548776662466927, 0.5698402909980532)
-"""Steps of a sequence that fills a square evenly: powers of the inverse plastic number."""
-
 
 def cell_edges(count: int, pitch: float) -> Array:
     """Return the edges of cells centered on 0.

@@ -39,7 +39,6 @@ SAME_CURVE = 1e-4
 """Light, white = 1, within which a curve is that of sRGB: profiles have it as a table."""
 MOST_HEADER = 1 << 16
 """Bytes of a header of Radiance that are searched."""
-_LINEAR_FORMATS = ("openexr", "hdr")
 _D65 = RGB_TO_XYZ.sum(axis=1)
 _XYZ_PRIMARIES = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0)
 _ADOBE = (0.64, 0.33, 0.21, 0.71, 0.15, 0.06, 0.3127, 0.3290)

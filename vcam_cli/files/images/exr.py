@@ -21,7 +21,7 @@ from vcam_cli.files.images.rows import (
     set_attributes,
 )
 
-ZIP, PIZ = "zip:1", "piz"  # lossless both
+ZIP = "zip:1"  # lossless
 oiio.attribute("limits:resolution", 1 << 28)  # a million by default; scattered pixels are one row
 _NOT_OURS = ("oiio:", "openexr:", "screenWindow", "compression", "PixelAspectRatio", "DateTime")
 
