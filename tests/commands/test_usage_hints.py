@@ -1,7 +1,5 @@
 """Arguments that no command takes are answered with those that are meant."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -12,12 +10,11 @@ from vcam_cli.commands.list_ import KINDS, WORDS
 from vcam_cli.commands.main import COMMANDS, app
 
 
-def said(tmp_path, *arguments):
+def said(*arguments):
     """What vcam prints on stderr when it refuses arguments."""
-    (tmp_path / "mine.yaml").write_text("extends: starter\n")
-    line = [sys.executable, "-m", "vcam_cli.commands.main", *arguments]
-    done = subprocess.run(line, capture_output=True, text=True, cwd=tmp_path)
-    assert done.returncode == 2
+    Path("mine.yaml").write_text("extends: starter\n")
+    done = CliRunner().invoke(app, list(arguments), prog_name="vcam")
+    assert done.exit_code == 2
     return done.stderr
 
 
@@ -43,12 +40,14 @@ def said(tmp_path, *arguments):
         ("list lens", "did you mean lenses?"),
     ],
 )
-def test_what_is_meant(arguments, meant, tmp_path):
-    assert meant in said(tmp_path, *arguments.split(" "))
+def test_what_is_meant(arguments, meant, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert meant in said(*arguments.split(" "))
 
 
-def test_a_path_and_its_value_with_a_colon(tmp_path):
-    line = said(tmp_path, "run", "mine.yaml", "--set", "pixel.width: 3 um")
+def test_a_path_and_its_value_with_a_colon(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    line = said("run", "mine.yaml", "--set", "pixel.width: 3 um")
     assert 'write pixel.width="3 um"' in line
 
 

@@ -197,13 +197,12 @@ class TestMain:
             main.Commands(name="vcam").make_context()
         assert caught.value.exit_code == 130
 
-    def test_a_folder_that_is_gone(self, folder):
-        line = ["sh", "-c", 'mkdir gone; cd gone; rmdir ../gone; exec "$@"', "sh", *VCAM]
+    def test_a_folder_that_is_gone(self, folder, monkeypatch):
+        (folder / "gone").mkdir()
+        monkeypatch.chdir(folder / "gone")
+        (folder / "gone").rmdir()
         for command in ("validate", "run"):
-            result = subprocess.run(
-                [*line, command, "starter"], capture_output=True, text=True, env=environment()
-            )
-            assert result.returncode == 3
+            result = vcam(command, "starter", code=3)
             assert result.stderr.startswith("the current folder is gone")
             assert len(result.stderr.splitlines()) == 1
 
