@@ -179,7 +179,7 @@ def test_ctrl_c_says_that_points_are_kept():
     write(vary={"pixel.width": {"start": "4 um", "stop": "6 um", "count": 200}})
     command = [sys.executable, "-m", "vcam_cli.commands.main", "sweep", "study.yaml"]
     root = str(Path(module.__file__).parents[2])
-    size = ["--set", "array.rows=300", "--set", "array.columns=300"]  # so that it lasts
+    size = ["--set", "array.rows=90", "--set", "array.columns=90"]  # so that it lasts
     process = subprocess.Popen(
         [*command, "--workers", "2", *size],
         env=os.environ | {"PYTHONPATH": root},
