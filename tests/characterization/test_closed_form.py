@@ -70,3 +70,11 @@ def test_responsivity_is_that_of_data_sheets(pattern, tmp_path):
             assert unit == "V/(lx s)"
             assert expected == pytest.approx(value, rel=2e-3)  # tables of 1 and of 5 nm
             assert measured == pytest.approx(expected / 2)
+
+
+def test_photons_of_a_luminous_exposure(tmp_path):
+    """Monochromatic light of 550 nm: A / (683 lm/W V h c / lambda), with the CIE's V(550 nm)."""
+    bench = prepare_bench(camera(tmp_path, {}), 1, Stages())
+    energy = PLANCK * LIGHT / 550e-9
+    expected = 25e-12 / (683.002 * 0.9949501 * energy)
+    assert bench.photons_per_exposure == pytest.approx(expected, rel=1e-4)

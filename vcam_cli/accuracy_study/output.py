@@ -52,7 +52,7 @@ def pareto_arguments(found: Study) -> tuple[Any, ...]:
             if e.unit.endswith("variance") == wanted and (e.measured or e.predicted)
         ]
         if pairs:
-            panels.append((f"change by leaving it out, {label}", pairs))
+            panels.append((f"change if skipped, {label}", pairs))
     tolerance = found.camera.accuracy.tolerance
     title = f"{found.camera.name}: accuracy and time"
     return title, points("preset", "tolerance"), curves, tolerance, panels, points("all")

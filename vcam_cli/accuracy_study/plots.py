@@ -7,11 +7,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from vcam_cli.files.plots import COLORS, MARKERS, STYLE, load, save
+from vcam_cli.files.plots import (
+    COLORS,
+    DASHES,
+    GRAY,
+    LIGHT_GRAY,
+    LIMIT,
+    MARKERS,
+    SMALL,
+    SMALLEST,
+    plot_figure,
+)
 
 FLOOR = 1e-9
 """What is smaller is drawn here: an error of 0 has no place on a logarithmic axis."""
-GRAY = "#666666"
 BESIDE = ((-14, -14, "right", "top"), (-4, 22, "center", "bottom"), (14, 12, "left", "bottom"))
 """Where the names of settings stand beside their circles [points], in turns."""
 
@@ -48,16 +57,9 @@ def pareto(
     one below the other; everything: presets with every effect on. Errors relative to full signal.
     Raises CannotDo where it cannot be written.
     """
-    matplotlib = load()
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    style: Any = {**matplotlib.rcParamsDefault, **STYLE}
-    with matplotlib.rc_context(style):
-        rows = [max(2, len(pairs)) for _, pairs in panels] or [1]
-        height = max(4.4, 1.5 + 0.24 * sum(rows))
-        figure = Figure(figsize=(9.6, height), dpi=200, layout="constrained")
-        FigureCanvasAgg(figure)
+    rows = [max(2, len(pairs)) for _, pairs in panels] or [1]
+    height = max(4.4, 1.5 + 0.24 * sum(rows))
+    with plot_figure(path, (9.6, height), dpi=200) as figure:
         grid = figure.add_gridspec(len(rows), 2, width_ratios=(1.5, 1), height_ratios=rows)
         left = figure.add_subplot(grid[:, 0])
         _error_over_time(left, presets, everything, curves, tolerance)
@@ -65,7 +67,6 @@ def pareto(
         left.set_title(title)
         for row, (label, pairs) in enumerate(panels):
             _pairs(figure.add_subplot(grid[row, 1]), label, pairs, legend=row == 0)
-        save(figure, path)
 
 
 def _error_over_time(
@@ -85,10 +86,11 @@ def _error_over_time(
     axes.set_yscale("log")
     axes.set_xlim(min(seconds) / 1.5, max(seconds) * 1.6)
     axes.set_ylim(min(errors) / 3, max([*errors, tolerance]) * 4)
-    for number, curve in enumerate(curves):
+    shown = [curve for curve in curves if any(error > FLOOR for _, error, _ in curve.points)]
+    for number, curve in enumerate(shown):
         _curve(axes, curve, COLORS[number % len(COLORS)], MARKERS[number % len(MARKERS)], number)
     _presets(axes, presets)
-    axes.axhline(tolerance, color="#888888", lw=0.9, ls=(0, (4, 3)), zorder=1)
+    axes.axhline(tolerance, color=GRAY, lw=0.9, ls=LIMIT, zorder=1)
     axes.annotate(
         f"tolerance: {100 * tolerance:.3g} %",
         (1, tolerance),
@@ -101,12 +103,12 @@ def _error_over_time(
     _plain_seconds(axes.xaxis)
     axes.yaxis.set_minor_locator(LogLocator(subs="auto"))
     axes.yaxis.set_minor_formatter(NullFormatter())
-    axes.set_xlabel("time of a frame [s]")
-    axes.set_ylabel("rms error of the mean raw, relative to full signal")
-    if curves:
-        below = {"loc": "upper left", "bbox_to_anchor": (0, -0.13), "ncols": 4, "fontsize": 7.5}
+    axes.set_xlabel("time per frame [s]")
+    axes.set_ylabel("rms error of the mean raw frame / full signal")
+    if shown:
+        below = {"loc": "upper left", "bbox_to_anchor": (0, -0.13), "ncols": 4, "fontsize": SMALL}
         axes.legend(**below, borderaxespad=0, title="error of one setting at a time; the coarsest"
-                    " and finest values are labeled", title_fontsize=7.5)  # fmt: skip
+                    " and finest values are labeled", title_fontsize=SMALL)  # fmt: skip
 
 
 def _curve(axes: Any, curve: Curve, color: str, marker: str, number: int) -> None:
@@ -115,10 +117,12 @@ def _curve(axes: Any, curve: Curve, color: str, marker: str, number: int) -> Non
     x = [point[0] for point in shown]
     y = [point[1] for point in shown]
     fill = color if number < len(COLORS) else "white"
-    axes.plot(x, y, marker=marker, ms=3.8, lw=0.9, color=color, mfc=fill, label=curve.name)
+    dashes = DASHES[number % len(DASHES)]
+    axes.plot(x, y, marker=marker, ms=3.8, lw=0.9, ls=dashes, color=color, mfc=fill,
+              label=curve.name)  # fmt: skip
     for at in sorted({0, len(x) - 1} & set(range(len(x)))):
         axes.annotate(shown[at][2], (x[at], y[at]), xytext=(4, 2), color=color,
-                      textcoords="offset points", fontsize=6.5)  # fmt: skip
+                      textcoords="offset points", fontsize=SMALLEST)  # fmt: skip
 
 
 def _presets(axes: Any, presets: Sequence[tuple[float, float, str]]) -> None:
@@ -156,7 +160,7 @@ def _everything(
     if everything:
         x, error, _ = max(everything)
         place = {"xytext": (0, -7), "textcoords": "offset points", "ha": "center", "va": "top"}
-        axes.annotate("all effects on", (x, max(error, FLOOR)), color=GRAY, fontsize=7, **place)
+        axes.annotate("all effects on", (x, max(error, FLOOR)), color=GRAY, fontsize=SMALL, **place)
 
 
 def _plain_seconds(axis: Any) -> None:
@@ -175,7 +179,7 @@ def _pairs(axes: Any, label: str, pairs: Sequence[Pair], legend: bool) -> None:
         found = max(pair.found, FLOOR)
         if pair.expected is not None:
             expected = max(pair.expected, FLOOR)
-            axes.plot([found, expected], [row, row], color="#bbbbbb", lw=1.6, zorder=1)
+            axes.plot([found, expected], [row, row], color=LIGHT_GRAY, lw=1.6, zorder=1)
             axes.plot(expected, row, "o", ms=7, mfc="none", mec=COLORS[1], mew=1.2)
         axes.plot(found, row, "o", ms=3.6, color=COLORS[0], zorder=3)
     axes.set_xscale("log")
@@ -190,5 +194,5 @@ def _pairs(axes: Any, label: str, pairs: Sequence[Pair], legend: bool) -> None:
         axes.set_title("contribution of each effect")
         axes.plot([], [], "o", ms=7, mfc="none", mec=COLORS[1], mew=1.2, label="expected")
         axes.plot([], [], "o", ms=3.6, color=COLORS[0], label="measured")
-        axes.legend(loc="lower left", bbox_to_anchor=(0.62, 1.0), ncols=2, fontsize=7.5,
+        axes.legend(loc="lower left", bbox_to_anchor=(0.62, 1.0), ncols=2, fontsize=SMALL,
                     borderaxespad=0.2, handletextpad=0.1, columnspacing=0.8)  # fmt: skip

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from vcam_cli.capture_schedules.methods import MethodResult, Task
-from vcam_cli.capture_schedules.pdf_plots import GRAY, Units
+from vcam_cli.capture_schedules.pdf_plots import Units
 from vcam_cli.capture_schedules.schedule_result import ScheduleResult
-from vcam_cli.files.plots import COLORS, plot_figure
+from vcam_cli.files.plots import COLORS, DASHES, GRAY, LIMIT, MARKERS, SMALL, plot_figure
 from vcam_cli.scheduling.pdf import Floats, Pdf
 
 LIGHTS = ((0.95, "bright"), (0.25, "dark"))
@@ -49,34 +49,37 @@ def plot_charge(result: ScheduleResult, shown: MethodResult, units: Units, path:
     line = np.geomspace(start, times[-1], POINTS) if wide else np.linspace(0, times[-1], POINTS)
     with plot_figure(path, (5.8, 3.6)) as figure:
         axes = figure.add_subplot()
-        axes.axhline(1.0, color=GRAY, lw=0.9, ls=(0, (4, 3)))
+        axes.axhline(1.0, color=GRAY, lw=0.9, ls=LIMIT)
         axes.vlines(times / size, 0, 1.0, color=GRAY, lw=0.5, alpha=0.6)
-        for (share, name), color in zip(LIGHTS, COLORS, strict=False):
-            _draw_light(axes, task, name, quantile(task.pdf, share), (line, times, size), color)
+        for series, (share, name) in enumerate(LIGHTS):
+            light = quantile(task.pdf, share)
+            _draw_light(axes, task, name, light, (line, times, size), series)
         if wide:
             axes.set_xscale("log")
         axes.set_ylim(0, 1.12)
         axes.set_xlim(start / size, times[-1] * 1.03 / size)
         axes.set_title(f"{result.study.model.name}: {shown.count} captures, {shown.method}")
         axes.set_xlabel(units.time)
-        axes.set_ylabel("charge / well")
-        axes.legend(fontsize=7.5, loc="lower right", framealpha=1)
+        axes.set_ylabel("charge / full well")
+        axes.legend(fontsize=SMALL, loc="lower right", framealpha=1)
 
 
 def _draw_light(
     axes: Any, task: Task, name: str, photocurrent: float, when: tuple[Floats, Floats, float],
-    color: str,
+    series: int,
 ) -> None:  # fmt: skip
     """Draw the charge over time (line, samples, unit of time); the sample used is filled."""
     line, times, size = when
+    color, marker = COLORS[series], MARKERS[series]
     sensor = task.sensor
 
     def charge(at: Floats) -> Floats:
         return np.minimum((photocurrent + sensor.dark) * at / sensor.well, 1.0)
 
     used = used_sample(times, photocurrent, task)
-    axes.plot(line / size, charge(line), color=color, lw=1.3, label=f"{name} pixel")
-    axes.plot(times / size, charge(times), "o", ms=5, mfc="white", color=color)
+    axes.plot(line / size, charge(line), color=color, lw=1.3, ls=DASHES[series],
+              label=f"{name} pixel")  # fmt: skip
+    axes.plot(times / size, charge(times), marker, ms=5, mfc="white", color=color)
     if used >= 0:
-        label = f"the last sample before saturation, {used + 1} of {times.size}"
-        axes.plot(times[used] / size, charge(times)[used], "o", ms=7, color=color, label=label)
+        label = f"last sample before saturation: {used + 1} of {times.size}"
+        axes.plot(times[used] / size, charge(times)[used], marker, ms=7, color=color, label=label)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from vcam_cli.arrays import Array
 from vcam_cli.files.images.png import write_png
-from vcam_cli.files.plots import COLORS, plot_figure
+from vcam_cli.files.plots import COLORS, SMALL, plot_figure
 
 Square = tuple[slice, slice]
 """Rows and columns of a part of a picture."""
@@ -141,7 +141,7 @@ def plot_noise(path: Path | str, title: str, pictures: Sequence[Picture], limit:
             axes.stairs(count, edges, fill=True, color=COLORS[0])
             axes.set_xlim(-limit, limit)
             axes.set_ylim(0, top)
-            axes.set_xlabel("error [%]")
+            axes.set_xlabel("relative error [%]")
             if column == 0:
                 axes.set_ylabel("pixels")
             else:
@@ -158,7 +158,7 @@ def _show_picture(
     axes.set_xticks([])
     axes.set_yticks([])
     axes.grid(visible=False)
-    axes.set_xlabel(text, fontsize=7.5)
+    axes.set_xlabel(text, fontsize=SMALL)
     if square is not None:
         rows, columns = square
         corner = (columns.start - 0.5, rows.start - 0.5)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.files.plots import COLORS, plot_figure
+from vcam_cli.files.plots import COLORS, GRAY, LIGHT_GRAY, SMALL, plot_figure
 from vcam_cli.scheduling.pdf import Floats, Indices, Pdf
 
 WIDE = 0.05
@@ -31,7 +31,6 @@ FEW_LEVELS = 64
 """Largest number of levels that are drawn as lines of their own."""
 DECADES = 6.0
 """Decades of an axis of photocurrents, at most."""
-GRAY, LIGHT_GRAY = "#777777", "#c9c9c9"
 METHOD_STYLES = {
     "optimal": (COLORS[0], "o"),
     "heuristic": (COLORS[2], "D"),
@@ -298,6 +297,6 @@ def _draw_captures(axes: Any, captures: Sequence[tuple[str, Array]]) -> None:
         axes.plot(inside, np.full(inside.shape, height), marker, ms=4.6, mfc="white", mew=1.2,
                   color=color)  # fmt: skip
         axes.annotate(method, (1.01, height), xycoords=("axes fraction", "data"), va="center",
-                      fontsize=7.5, color=color)  # fmt: skip
+                      fontsize=SMALL, color=color)  # fmt: skip
     if captures:
         axes.set_ylim(0, top * (1.08 + 0.13 * len(captures)))

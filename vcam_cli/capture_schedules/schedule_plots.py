@@ -15,7 +15,6 @@ from vcam_cli.capture_schedules.methods import MethodResult, Task
 from vcam_cli.capture_schedules.model import DENSITIES
 from vcam_cli.capture_schedules.pdf_plots import (
     DISPLAYED,
-    GRAY,
     METHOD_STYLES,
     Units,
     draw_density,
@@ -23,7 +22,7 @@ from vcam_cli.capture_schedules.pdf_plots import (
     label_axes,
 )
 from vcam_cli.capture_schedules.schedule_result import ScheduleResult
-from vcam_cli.files.plots import COLORS, plot_figure
+from vcam_cli.files.plots import COLORS, DASHES, GRAY, INK, LIMIT, MARK, SMALL, plot_figure
 from vcam_cli.scheduling.pdf import Pdf
 from vcam_cli.scheduling.sensor import Sensor
 
@@ -32,10 +31,6 @@ SHOWN = 8
 FEW = 10
 """Largest number of segments of a histogram of which every step of its binning is drawn."""
 TIME_UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "us"), (1e-9, "ns"))
-DASHED: Any = (0, (4, 3))
-DOTTED: Any = (0, (1, 2))
-LINES: Any = ("-", DASHED, DOTTED, (0, (6, 2, 1, 2)))
-"""Of curves whose pdf is estimated as `DENSITIES` says."""
 GAIN_LABEL = "mean SNR / that of a single capture"
 
 
@@ -71,7 +66,7 @@ def plot_gain(result: ScheduleResult, path: Path) -> None:
         grid = figure.add_gridspec(1, 2, width_ratios=(2.1, 1))
         axes = figure.add_subplot(grid[0, 0])
         _draw_gain_curves(axes, _curves_over_captures(result.found, task), ms=3.8, lw=1.1)
-        axes.axhline(task.largest_gain, color=GRAY, lw=0.9, ls=DASHED, label="upper bound")
+        axes.axhline(task.largest_gain, color=GRAY, lw=0.9, ls=LIMIT, label="upper bound")
         axes.set_title(result.study.model.name)
         axes.set_xlabel("number of captures")
         axes.set_ylabel(GAIN_LABEL)
@@ -81,7 +76,7 @@ def plot_gain(result: ScheduleResult, path: Path) -> None:
         beside.set_title("pixels")
         label_axes(beside, study_units(result), wide)
         figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4,
-                      fontsize=7.5)  # fmt: skip
+                      fontsize=SMALL)  # fmt: skip
 
 
 def plot_gain_over_segments(result: ScheduleResult, path: Path) -> None:
@@ -97,12 +92,12 @@ def plot_gain_over_segments(result: ScheduleResult, path: Path) -> None:
     with plot_figure(path, (5.6, 3.7)) as figure:
         axes = figure.add_subplot()
         _draw_gain_curves(axes, _curves_over_segments(result, count), ms=4, lw=1.2)
-        axes.axhline(result.task.gain(best), color=GRAY, lw=0.9, ls=DASHED,
+        axes.axhline(result.task.gain(best), color=GRAY, lw=0.9, ls=LIMIT,
                      label="optimal for the pdf itself")  # fmt: skip
         axes.set_title(f"{result.study.model.name}: {count} captures")
         axes.set_xlabel("segments of the approximated pdf")
         axes.set_ylabel(GAIN_LABEL)
-        axes.legend(fontsize=7.5)
+        axes.legend(fontsize=SMALL)
 
 
 def plot_captures(result: ScheduleResult, path: Path) -> None:
@@ -130,7 +125,7 @@ def plot_captures(result: ScheduleResult, path: Path) -> None:
         for number, row in enumerate(rows):
             _draw_capture_row(axes, number, row, task.gain(row.schedule), units.size)
         axes.annotate("gain", (1.01, -0.75), xycoords=("axes fraction", "data"), va="center",
-                      fontsize=7.5, color="#444444", annotation_clip=False)  # fmt: skip
+                      fontsize=SMALL, color=INK, annotation_clip=False)  # fmt: skip
         axes.set_ylim(len(rows) - 0.45, -0.55)
         axes.set_yticks(range(len(rows)), [row.method for row in rows])
         axes.tick_params(axis="y", length=0)
@@ -270,11 +265,11 @@ def _draw_gain_curves(axes: Any, curves: Sequence[GainCurve], ms: float, lw: flo
         line: Any = "-"
         if curve.density:
             number = DENSITIES.index(curve.density)
-            color, line = COLORS[number], LINES[number]
+            color, line = COLORS[number], DASHES[number]
         axes.plot(curve.x, curve.gains, marker=marker, ms=ms, lw=lw, color=color, ls=line,
                   label=curve.label)  # fmt: skip
         if curve.bound:
-            axes.plot(curve.x, curve.bound, color=color, lw=0.9, ls=DOTTED,
+            axes.plot(curve.x, curve.bound, color=color, lw=0.9, ls=MARK,
                       label=f"upper bound, {curve.method}")  # fmt: skip
     axes.xaxis.set_major_locator(MaxNLocator(nbins=10, integer=True, min_n_ticks=1))
     numbers = {x for curve in curves for x in curve.x}
@@ -290,7 +285,7 @@ def _draw_capture_row(axes: Any, number: int, row: MethodResult, gain: float, si
     axes.hlines(number, x[0], x[-1], color=color, lw=0.6, alpha=0.5)
     axes.vlines(x, number - 0.33, number + 0.33, color=color, lw=1.7)
     axes.annotate(f"{gain:.4g}", (1.01, number), xycoords=("axes fraction", "data"), va="center",
-                  fontsize=7.5)  # fmt: skip
+                  fontsize=SMALL)  # fmt: skip
 
 
 def _draw_saturation(

@@ -132,6 +132,16 @@ class Bench:
         per_area *= g.irradiance_per_radiance
         return per_area * g.pitch_x * g.pitch_y
 
+    @property
+    def photons_per_exposure(self) -> float:
+        """Photons on a pixel for a luminous exposure of the sensor [1/(lx s)]; 0 for infrared."""
+        ready = self.ready
+        color = int(np.argmax(ready.white_rate))
+        per_exposure = ready.solved.electrons_per_exposure(ready.scene.white)[color]
+        per_photon = float(ready.white_rate[color]) / self.photon_rate
+        found = float(per_exposure) / per_photon
+        return found if np.isfinite(found) else 0.0
+
     def efficiency(self, color: str) -> float:
         """Return the electrons per photon on the pixel of one color, by the model."""
         index = self.ready.mosaic.colors.index(color)

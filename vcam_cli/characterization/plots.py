@@ -10,13 +10,14 @@ from vcam_cli.arrays import Array
 from vcam_cli.characterization.characterize import Characterization
 from vcam_cli.characterization.exposures import Channel
 from vcam_cli.files.curves import Curve, Mark, Panel
+from vcam_cli.files.plots import channel_series
 from vcam_cli.quality.photon_transfer import GAIN_RANGE, ROUNDING
 
-PALETTE = {"R": 1, "G": 2, "B": 0, "Y": 0}
-"""Indices of the colors of the plots' palette for the colors of filters; others get the rest."""
 MTF_RANGE = 2.4
 """End of the axis of spatial frequencies, over the Nyquist frequency."""
-PHOTONS_LABEL = "photons on a pixel"
+LINE_START = 0.01
+"""Start of the fitted line over saturation: below it the offset of the fit outweighs its slope."""
+PHOTONS_LABEL = "photons per pixel"
 
 
 def characterization_panels(result: Characterization) -> dict[str, tuple[str, list[Panel]]]:
@@ -37,22 +38,26 @@ def _merged_plot(result: Characterization) -> dict[str, tuple[str, list[Panel]]]
         return {}
     signal, measured, expected = np.array([point.row for point in result.merged]).T
     curves = [
-        Curve("measured", signal, 10 ** (measured / 20), "points", 0),
-        Curve("model", signal, 10 ** (expected / 20), "line", 0),
-        Curve("shot-noise limit", signal, np.sqrt(signal), "dashed", -1),
+        Curve("measured", signal, measured, "points", 0),
+        Curve("model", signal, expected, "line", 0),
+        Curve("shot-noise limit", signal, _decibels(np.sqrt(signal)), "dashed", -1),
     ]
-    panel = Panel(
-        "signal of the large photodiode [e]", "signal over temporal noise", curves, log=True
-    )
+    panel = Panel("signal of the large photodiode [e]", "temporal SNR [dB]", curves, log="x")
     return {"merged_snr.png": (f"{result.bench.camera.name}: SNR of all readouts", [panel])}
 
 
+def _decibels(ratio: Array) -> Array:
+    """Return 20 log10 of ratios of signals; -inf for 0."""
+    with np.errstate(divide="ignore"):
+        decibels: Array = 20 * np.log10(ratio)
+    return decibels
+
+
 def _styled_channels(result: Characterization) -> Iterator[tuple[Channel, int, str]]:
-    """Yield each channel, its color in the plots, and the beginning of its labels."""
-    others = iter((3, 4, 5, 6, 7))
-    for channel in result.channels:
-        color = PALETTE[channel.color] if channel.color in PALETTE else next(others)
-        yield channel, color, f"{channel.color}: " if len(result.channels) > 1 else ""
+    """Yield each channel, its series in the plots, and the beginning of its labels."""
+    numbers = channel_series([channel.color for channel in result.channels])
+    for channel, series in zip(result.channels, numbers, strict=True):
+        yield channel, series, f"{channel.color}: " if len(result.channels) > 1 else ""
 
 
 def _photon_transfer_panel(result: Characterization) -> Panel:
@@ -60,17 +65,18 @@ def _photon_transfer_panel(result: Characterization) -> Panel:
     for channel, color, prefix in _styled_channels(result):
         transfer, series = channel.transfer, channel.transfer.series
         ends.append(Mark(float(series.signal[series.saturation_index]), "saturation", color))
-        line = np.array([0.0, ends[-1].x])
+        line = np.geomspace(LINE_START * ends[-1].x, ends[-1].x, 100)
         fit = transfer.offset + transfer.gain * line
         curves += [
             Curve(f"{prefix}measured", series.signal, series.noise, "points", color),
             Curve(f"{prefix}K = {transfer.gain:.4g} DN/e", line, fit, "line", color),
         ]
     return Panel(
-        "mean above the dark [DN]",
-        "temporal variance above the dark [DN²]",
+        "mean signal above dark [DN]",
+        "temporal variance above dark [DN²]",
         curves,
         [Mark(GAIN_RANGE * ends[0].x, "end of the fit"), ends[0]],
+        log="xy",
         legend="upper left",
     )
 
@@ -78,30 +84,37 @@ def _photon_transfer_panel(result: Characterization) -> Panel:
 def _snr_panel(result: Characterization) -> Panel:
     curves: list[Curve] = []
     marks: list[Mark] = []
+    unit = result.bench.photons_per_exposure
+    is_visible = unit > 0
+    unit = unit or 1.0  # infrared light: over photons
     for channel, color, prefix in _styled_channels(result):
         transfer, series = channel.transfer, channel.transfer.series
         used = np.arange(len(series.photons)) <= series.saturation_index
         photons = np.geomspace(transfer.threshold_photons / 3, transfer.saturation_photons, 200)
-        model = _model_snr(result, channel, photons)
+        measured = _decibels(series.snr[used])
+        model = _decibels(_model_snr(result, channel, photons))
         curves += [
-            Curve(f"{prefix}measured", series.photons[used], series.snr[used], "points", color),
-            Curve(f"{prefix}model", photons, model, "line", color),
+            Curve(f"{prefix}measured", series.photons[used] / unit, measured, "points", color),
+            Curve(f"{prefix}model", photons / unit, model, "line", color),
         ]
         first = not marks  # the texts of one color are enough
         marks += [
-            Mark(transfer.threshold_photons, "threshold" if first else "", color),
-            Mark(transfer.saturation_photons, "saturation" if first else "", color),
+            Mark(transfer.threshold_photons / unit, "threshold" if first else "", color),
+            Mark(transfer.saturation_photons / unit, "saturation" if first else "", color),
         ]
     ends = [mark.x for mark in marks]
-    photons = np.geomspace(min(ends) / 3, max(ends), 50)
-    curves.append(Curve("shot-noise limit", photons, np.sqrt(photons), "dashed", -1))
+    light = np.geomspace(min(ends) / 3, max(ends), 50)
+    limit = _decibels(np.sqrt(light * unit))
+    curves.append(Curve("shot-noise limit", light, limit, "dashed", -1))
+    above = (PHOTONS_LABEL, unit)
     return Panel(
-        PHOTONS_LABEL,
-        "signal over temporal noise",
+        "luminous exposure of the sensor [lx s]" if is_visible else PHOTONS_LABEL,
+        "temporal SNR [dB]",
         curves,
         marks,
-        log=True,
-        y_range=(0.1, 6 * float(np.sqrt(photons[-1]))),
+        log="x",
+        scale_above=above if is_visible else None,
+        y_range=(-20.0, float(limit[-1]) + 15),
         legend="upper left",
     )
 
@@ -131,32 +144,34 @@ def _linearity_panels(result: Characterization) -> list[Panel]:
     reach = 2 * max(float(np.abs(c.y).max()) for c in deviation) or 1.0  # room for the legend
     limits = (-reach, reach)
     return [
-        Panel(PHOTONS_LABEL, "mean above the dark [DN]", response, legend="lower right"),
-        Panel(PHOTONS_LABEL, "deviation [%]", deviation, height=0.5, y_range=limits,
+        Panel(PHOTONS_LABEL, "mean signal above dark [DN]", response, legend="lower right"),
+        Panel(PHOTONS_LABEL, "linearity deviation [%]", deviation, height=0.5, y_range=limits,
               legend="upper right"),
     ]  # fmt: skip
 
 
 def _mtf_panel(result: Characterization) -> Panel:
+    pitch = result.bench.ready.geometry.pitch_x
     curves, marks = [], []
     for channel, color, prefix in _styled_channels(result):
         edge = channel.edge.measured
         shown = edge.frequency <= MTF_RANGE * result.nyquist
-        frequency = edge.frequency[shown] / 1e3
+        frequency = edge.frequency[shown] * pitch
         curves += [
             Curve(f"{prefix}slanted edge", frequency[::2], edge.mtf[shown][::2], "points", color),
             Curve(f"{prefix}model", frequency, channel.edge.expected[shown], "line", color),
         ]
         if np.isfinite(edge.mtf50):
-            mtf50 = edge.mtf50 / 1e3
-            marks.append(Mark(mtf50, f"{prefix}MTF50 {mtf50:.4g}", color))
-    marks.append(Mark(result.nyquist / 1e3, "Nyquist"))
+            mtf50 = edge.mtf50 * pitch
+            marks.append(Mark(mtf50, f"{prefix}MTF50 {mtf50:.3g}", color))
+    marks.append(Mark(result.nyquist * pitch, "Nyquist"))
     return Panel(
-        "spatial frequency on the sensor [lp/mm]",
-        "transfer",
+        "spatial frequency [cycles/pixel]",
+        "MTF",
         curves,
         marks,
-        x_range=(0, MTF_RANGE * result.nyquist / 1e3),
+        scale_above=("spatial frequency on the sensor [lp/mm]", 1e-3 / pitch),
+        x_range=(0, MTF_RANGE * result.nyquist * pitch),
         y_range=(0, 1.05),
         legend="upper right",
     )

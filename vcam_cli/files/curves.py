@@ -13,7 +13,16 @@ from typing import Any, Literal
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.files.plots import COLORS, MARKERS, plot_figure
+from vcam_cli.files.plots import (
+    DASHES,
+    LIMIT,
+    MARK,
+    MARKERS,
+    SMALL,
+    add_scale,
+    color_of,
+    plot_figure,
+)
 
 Look = Literal["points", "line", "dashed"]
 
@@ -29,25 +38,25 @@ class Curve:
     x, y : (n,) arrays
         Points in the units of the axes; those that are not finite are left out.
     look : {"points", "line", "dashed"}
-        How the points are drawn.
-    color : int
-        Index into `plots.COLORS`, which repeat; -1 is gray.
+        How the points are drawn; dashed is a limit.
+    series : int
+        Number of its color, marker and dashes in `plots.py`; -1 is gray.
     """
 
     name: str
     x: Array
     y: Array
     look: Look = "points"
-    color: int = 0
+    series: int = 0
 
 
 @dataclass(frozen=True)
 class Mark:
-    """A vertical line at x with a text beside it, in a color as of `Curve`."""
+    """A vertical line at x with a text beside it, in the color of a series as of `Curve`."""
 
     x: float
     text: str
-    color: int = -1
+    series: int = -1
 
 
 @dataclass(frozen=True)
@@ -62,8 +71,10 @@ class Panel:
         What is drawn.
     marks : sequence of Mark
         Vertical lines.
-    log : bool
-        Whether both axes are logarithmic.
+    log : str
+        Logarithmic axes: "", "x", "y" or "xy".
+    scale_above : tuple of (str, float), optional
+        Label of a second horizontal scale above, and a unit of the scale below in its units.
     x_range, y_range : tuple of float, optional
         Ends of the axes; by default those of the curves.
     height : float
@@ -76,7 +87,8 @@ class Panel:
     y_label: str
     curves: Sequence[Curve]
     marks: Sequence[Mark] = ()
-    log: bool = False
+    log: str = ""
+    scale_above: tuple[str, float] | None = None
     x_range: tuple[float, float] | None = None
     y_range: tuple[float, float] | None = None
     height: float = 1.0
@@ -113,8 +125,9 @@ def draw(path: Path | str, title: str, panels: Sequence[Panel]) -> None:
 
 
 def _panel(axes: Any, panel: Panel, last: bool) -> None:
-    if panel.log:
+    if "x" in panel.log:
         axes.set_xscale("log")
+    if "y" in panel.log:
         axes.set_yscale("log")
     for curve in panel.curves:
         _curve(axes, curve, panel.log)
@@ -130,28 +143,30 @@ def _panel(axes: Any, panel: Panel, last: bool) -> None:
     else:
         axes.tick_params(labelbottom=False)
     if any(curve.name for curve in panel.curves):
-        axes.legend(loc=panel.legend, fontsize=7.5)
+        axes.legend(loc=panel.legend, fontsize=SMALL)
+    if panel.scale_above:
+        add_scale(axes, *panel.scale_above)
 
 
-def _curve(axes: Any, curve: Curve, log: bool) -> None:
+def _curve(axes: Any, curve: Curve, log: str) -> None:
     keep = np.isfinite(curve.x) & np.isfinite(curve.y)
-    if log:
-        keep &= (curve.x > 0) & (curve.y > 0)
+    keep &= (curve.x > 0) | ("x" not in log)
+    keep &= (curve.y > 0) | ("y" not in log)
     x, y = curve.x[keep], curve.y[keep]
-    color = _color(curve.color)
+    color = color_of(curve.series)
     label = curve.name or "_nolegend_"
     if curve.look == "points":
-        marker = MARKERS[curve.color % len(MARKERS)]
+        marker = MARKERS[curve.series % len(MARKERS)]
         axes.plot(x, y, marker, ms=3, color=color, alpha=0.8, mew=0, label=label)
         return
-    dashes = (0, (4, 3)) if curve.look == "dashed" else "-"
+    dashes = LIMIT if curve.look == "dashed" else DASHES[max(curve.series, 0) % len(DASHES)]
     axes.plot(x, y, color=color, lw=1.0, ls=dashes, label=label)
 
 
 def _mark(axes: Any, mark: Mark, number: int) -> None:
     """Draw a vertical line with its text beside it, the texts at different heights."""
-    color = _color(mark.color)
-    axes.axvline(mark.x, color=color, lw=0.8, ls=(0, (1, 2)))
+    color = color_of(mark.series)
+    axes.axvline(mark.x, color=color, lw=0.8, ls=MARK)
     axes.annotate(
         mark.text,
         (mark.x, 0.02 + 0.055 * number),
@@ -159,11 +174,7 @@ def _mark(axes: Any, mark: Mark, number: int) -> None:
         xytext=(-3, 0),
         textcoords="offset points",
         ha="right",
-        fontsize=7.5,
+        fontsize=SMALL,
         color=color,
         bbox={"fc": "white", "ec": "none", "pad": 0.6, "alpha": 0.8},
     )
-
-
-def _color(number: int) -> str:
-    return "#777777" if number < 0 else COLORS[number % len(COLORS)]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vcam_cli.files.plots import COLORS, MARKERS, plot_figure
+from vcam_cli.files.plots import COLORS, DASHES, INK, MARKERS, SMALL, plot_figure
 from vcam_cli.fitting.parameters import Parameter
 from vcam_cli.fitting.result import Fit
 from vcam_cli.quality.photon_transfer import GAIN_RANGE
@@ -40,11 +40,14 @@ def draw_photon_transfer(path: Path, found: Fit) -> None:
             marker = MARKERS[number % len(MARKERS)]
             axes.plot(series.signal, variance, marker, color=color, markersize=4, label=name)
             reach = GAIN_RANGE * series.signal[series.saturation_index]
-            ends = np.array([0.0, reach])
-            axes.plot(ends, curve.gain.value * ends, color=color, linewidth=1)
-        axes.set_xlabel("mean above dark [DN]")
+            positive = series.signal[series.signal > 0]
+            ends = np.array([positive.min(), reach])
+            axes.plot(ends, curve.gain.value * ends, color=color, linewidth=1,
+                      ls=DASHES[number % len(DASHES)])  # fmt: skip
+        axes.set(xscale="log", yscale="log")
+        axes.set_xlabel("mean signal above dark [DN]")
         axes.set_ylabel("temporal variance above dark [DN²]")
-        axes.legend()
+        axes.legend(fontsize=SMALL)
         axes.set_title("Photon transfer; lines: fitted gain, over the fitted range")
 
 
@@ -80,12 +83,12 @@ def draw_intervals(path: Path, found: Fit) -> None:
         for place, p in enumerate(known):
             ends = np.clip([100 * (end / p.value - 1) for end in (p.low, p.high)], -MOST, MOST)
             axes.plot(ends, (place, place), color=COLORS[0], linewidth=2.5)
-        axes.axvline(0, color="#444444", linewidth=0.7)
+        axes.axvline(0, color=INK, linewidth=0.7)
         axes.set_yticks(range(len(known)), [f"{p.name}  {p.value:.4g} {_unit(p)}" for p in known])
         axes.set_ylim(len(known) - 0.5, -0.5)
         axes.set_xscale("symlog", linthresh=1.0)
         axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
-        axes.set_xlabel("90 % interval, relative to the value [%]")
+        axes.set_xlabel("deviation from the value [%]")
         axes.set_title("90 % confidence intervals")
 
 

@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.files.plots import COLORS, MARKERS, plot_figure
+from vcam_cli.files.plots import COLORS, DASHES, MARK, MARKERS, SMALL, SMALLEST, plot_figure
 from vcam_cli.files.tables import Cell
 from vcam_cli.sweeps.sweep_result import CaseOptimum
 
-DASHES = ("-", (0, (5, 2.5)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))
 SIZES = {1: (6.4, 4.2), 2: (9.6, 3.9), 3: (12.6, 3.7)}
 """Number of columns -> inches of one row."""
 WIDE_X, WIDE_Y = 20.0, 50.0
@@ -91,14 +90,14 @@ def draw(path: Path | str, title: str, content: FigureContent) -> None:
             axes.set(xlabel=panel.x_label, ylabel=panel.y_label)
             _draw_panel(figure, axes, panel)
             if len(names) > 1 and (number == 0 or names != legends[0]):
-                axes.legend(fontsize=7.5, **place)
+                axes.legend(fontsize=SMALL, **place)
         if len(panels) > 1:
             figure.suptitle(title, fontsize=9.5)
 
 
 def _draw_panel(figure: Any, axes: Any, panel: Panel) -> None:
     for place, color in panel.marks:
-        axes.axvline(place, color=COLORS[color % len(COLORS)], lw=1, ls=DASHES[2], zorder=1)
+        axes.axvline(place, color=COLORS[color % len(COLORS)], lw=1, ls=MARK, zorder=1)
     for curve in panel.curves:
         _draw_curve(axes, curve)
     if panel.image is not None:
@@ -140,7 +139,7 @@ def _draw_curve(axes: Any, curve: Curve) -> None:
     if curve.dash is not None:
         style["ls"] = DASHES[curve.dash % len(DASHES)]
     if curve.has_points:
-        style |= {"marker": MARKERS[curve.color // len(COLORS) % len(MARKERS)], "ms": 3.4}
+        style |= {"marker": _marker(curve.color), "ms": 3.4}
     axes.plot(curve.x, curve.y, label=curve.name or "_", zorder=3, **style)
     if curve.low is not None and curve.dash is None:
         axes.vlines(curve.x, curve.low, curve.high, color=color, lw=2.4, alpha=0.4)
@@ -150,13 +149,18 @@ def _draw_curve(axes: Any, curve: Curve) -> None:
         _draw_optimum(axes, curve.optimum, color)
 
 
+def _marker(series: int) -> str:
+    """Return the marker of a series: no two series share it and the color."""
+    return MARKERS[(series + series // len(COLORS)) % len(MARKERS)]
+
+
 def _draw_optimum(axes: Any, best: CaseOptimum, color: str) -> None:
     """Draw the cross and the interval of an optimum; without one, mark the best end."""
     if best.edge:
         marker, side = ("<", "left") if best.edge == "low" else (">", "right")
         axes.plot(best.end, best.value, marker, ms=8, mfc="none", mec="black", mew=1.2, zorder=5)
         aside = {"xytext": (0, -9), "textcoords": "offset points", "va": "top", "ha": side}
-        axes.annotate("no optimum", (best.end, best.value), fontsize=6.5, **aside)
+        axes.annotate("no optimum", (best.end, best.value), fontsize=SMALLEST, **aside)
         return
     ends, values = [best.low, best.high], [best.value, best.value]
     axes.plot(ends, values, color=color, lw=3.2, alpha=0.45, zorder=4, solid_capstyle="butt")

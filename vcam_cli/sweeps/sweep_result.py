@@ -43,7 +43,7 @@ class Extras:
     report: bool = False
     """Whether report.html is."""
     formats: tuple[str, ...] = ()
-    """Formats of plots beside PNG, of `plots.FORMATS`."""
+    """Formats of plots beside PNG: "svg", "pdf"."""
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from vcam_cli.files.plots import COLORS, plot_figure
+from vcam_cli.files.plots import COLORS, INK, LIMIT, plot_figure
 from vcam_cli.verification.verify import Verification
 
 LEAST_BINS, MOST_BINS = 10, 60
@@ -32,10 +32,10 @@ def draw_errors(path: Path, result: Verification) -> None:
         axes.set_xlabel("error of the prediction [%]")
         axes.set_ylabel("number of predictions")
         axes.yaxis.get_major_locator().set_params(integer=True)
-        axes.axvline(0, color="#444444", linewidth=0.7)
+        axes.axvline(0, color=INK, linewidth=0.7)
         for tolerance in tolerances if len(tolerances) == 1 else ():
             for side in (-100 * tolerance, 100 * tolerance):
-                axes.axvline(side, color=COLORS[1], linewidth=1, linestyle="--")
+                axes.axvline(side, color=COLORS[1], linewidth=1, linestyle=LIMIT)
         names = f"{result.measurement.name} against {result.camera.name}"
         largest = f"largest error {np.abs(percent).max():.2g} %" if percent.size else "no errors"
         axes.set_title(f"{names}\n{len(means)} predictions, {largest}")
@@ -49,7 +49,7 @@ def _draw_deviations(axes: Any, result: Verification) -> None:
     values = np.clip([row.deviation or 0.0 for row in rows], -ends, ends)
     axes.hist(values, np.linspace(-ends, ends, 41), color=COLORS[0], edgecolor="white")
     for side in (-limit, limit):
-        axes.axvline(side, color=COLORS[1], linewidth=1, linestyle="--")
+        axes.axvline(side, color=COLORS[1], linewidth=1, linestyle=LIMIT)
     axes.set_xlabel("deviation [standard errors]; values beyond the axis are in the end bins")
     axes.set_ylabel("number of quantities")
     axes.yaxis.get_major_locator().set_params(integer=True)

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from vcam_cli.files.plots import COLORS, STYLE, load, save
+from vcam_cli.files.plots import COLORS, DASHES, GRAY, INK, MARKERS, SMALL, plot_figure
 from vcam_cli.simulation.lens_page import SHOWN, LensPage
 
 SIZE = 11.0, 8.2
 """Width and height [in]."""
-LIGHT = ("#0072b2", "#009e73", "#d55e00")
+LIGHT = COLORS[0], COLORS[2], COLORS[1]
 """Colors of the three wavelengths, from short to long."""
 GLASS = "#dbe9f4"
 SPOT_SHARE = 0.995
@@ -29,11 +29,7 @@ def plot_lens(path: Path | str, page: LensPage) -> None:
     page : LensPage
         What is drawn.
     """
-    matplotlib = load()
-    from matplotlib.figure import Figure
-
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=SIZE, dpi=110, layout="constrained")
+    with plot_figure(path, SIZE, dpi=110) as figure:
         parts: Any = figure.subfigures(3, 1, height_ratios=(1.25, 0.85, 1.0))
         top, middle, bottom = parts
         top.suptitle(page.title, x=0.01, ha="left", fontsize=12)
@@ -44,11 +40,10 @@ def plot_lens(path: Path | str, page: LensPage) -> None:
         mtf, distortion, light, color = bottom.subplots(1, 4, width_ratios=(1.5, 1, 1, 1.2))
         _draw_mtf(mtf, page)
         heights = page.heights * 1e3
-        _draw_curve(distortion, heights, 100 * page.distortion, "Distortion [%]")
-        _draw_curve(light, heights, 100 * page.illumination, "Relative illumination [%]")
+        _draw_curve(distortion, heights, 100 * page.distortion, "distortion [%]")
+        _draw_curve(light, heights, 100 * page.illumination, "relative illumination [%]")
         light.set_ylim(0, 105)
         _draw_color(color, page)
-        save(figure, path)
 
 
 def _draw_section(axes: Any, page: LensPage) -> None:
@@ -62,9 +57,10 @@ def _draw_section(axes: Any, page: LensPage) -> None:
             axes.fill(edge_z[keep] * 1e3, edge_x[keep] * 1e3, color=GLASS, lw=0, zorder=1)
             axes.plot(edge_z[keep] * 1e3, edge_x[keep] * 1e3, color="#46607a", lw=0.8, zorder=3)
     for number, (z, x) in enumerate(drawing.fans):
-        axes.plot(z * 1e3, x * 1e3, color=COLORS[number], lw=0.6, zorder=2)
+        style: Any = {"color": COLORS[number], "ls": DASHES[number]}
+        axes.plot(z * 1e3, x * 1e3, lw=0.6, zorder=2, **style)
         angle = np.degrees(page.angles[[0, 5, 8][number]])
-        axes.plot([], [], color=COLORS[number], lw=1, label=f"{angle:.3g}°")
+        axes.plot([], [], lw=1, label=f"{angle:.3g}°", **style)
     place, radius = drawing.stop
     reach = max(float(np.nanmax(np.abs(x))) for _, x in drawing.outlines)
     for side in (1, -1):
@@ -73,11 +69,11 @@ def _draw_section(axes: Any, page: LensPage) -> None:
     image = page.view.lens.length * 1e3
     half = 1.05 * page.heights[-1] * 1e3
     axes.plot([image, image], [-half, half], color="black", lw=1)
-    axes.axhline(0, color="#999999", lw=0.5, dashes=(8, 3, 2, 3), zorder=0)
+    axes.axhline(0, color=GRAY, lw=0.5, dashes=(8, 3, 2, 3), zorder=0)
     axes.set_aspect("equal")
     axes.grid(False)
     axes.set_xlabel("z [mm]")
-    axes.legend(loc="lower left", fontsize=7.5, ncols=3)
+    axes.legend(loc="lower left", fontsize=SMALL, ncols=3)
 
 
 def _write_facts(axes: Any, page: LensPage) -> None:
@@ -107,36 +103,38 @@ def _draw_spots(axes: Any, page: LensPage) -> None:
         frame.set_xlim(-half, half)
         frame.set_ylim(-half, half)
         frame.set_aspect("equal")
-        frame.set_xlabel("outwards [um]", fontsize=7.5)
-    axes[0].set_ylabel("Spots [um]")
+        frame.set_xlabel("radial [um]", fontsize=SMALL)
+    axes[0].set_ylabel("spot diagram, tangential [um]")
 
 
 def _draw_mtf(axes: Any, page: LensPage) -> None:
     heights = page.heights * 1e3
     for i, frequency in enumerate(page.frequencies):
         name = f"{frequency / 1e3:.3g} lp/mm"
-        axes.plot(heights, page.sagittal[i], color=COLORS[i], lw=1.2, label=name)
+        axes.plot(heights, page.sagittal[i], MARKERS[i], ls="-", ms=3, color=COLORS[i], lw=1.2,
+                  label=name)  # fmt: skip
         axes.plot(heights, page.tangential[i], color=COLORS[i], lw=1.2, ls="--")
-    axes.plot([], [], color="#444444", lw=1, label="sagittal")
-    axes.plot([], [], color="#444444", lw=1, ls="--", label="tangential")
+    axes.plot([], [], color=INK, lw=1, label="sagittal")
+    axes.plot([], [], color=INK, lw=1, ls="--", label="tangential")
     axes.set_ylim(0, 1.02)
-    axes.set_title("MTF, light even over the band")
+    axes.set_ylabel("MTF, equal-energy light")
     axes.set_xlabel("image height [mm]")
-    axes.legend(fontsize=7, loc="best")
+    axes.legend(fontsize=SMALL, loc="best")
 
 
-def _draw_curve(axes: Any, heights: Any, values: Any, title: str) -> None:
+def _draw_curve(axes: Any, heights: Any, values: Any, label: str) -> None:
     axes.plot(heights, values, color=COLORS[0], lw=1.3)
-    axes.set_title(title)
+    axes.set_ylabel(label)
     axes.set_xlabel("image height [mm]")
 
 
 def _draw_color(axes: Any, page: LensPage) -> None:
     for i, wave in enumerate(page.wavelengths):
         name = f"{wave * 1e9:.0f} nm"
-        axes.plot(page.heights * 1e3, page.color[:, i] * 1e6, color=LIGHT[i], lw=1.3, label=name)
-    axes.axhline(0, color="#888888", lw=0.6)
+        axes.plot(page.heights * 1e3, page.color[:, i] * 1e6, color=LIGHT[i], lw=1.3, ls=DASHES[i],
+                  label=name)  # fmt: skip
+    axes.axhline(0, color=GRAY, lw=0.6)
     primary = page.view.lens.primary * 1e9
-    axes.set_title(f"Lateral color [um], from {primary:.0f} nm")
+    axes.set_ylabel(f"lateral color [um], 0 at {primary:.0f} nm")
     axes.set_xlabel("image height [mm]")
-    axes.legend(fontsize=7)
+    axes.legend(fontsize=SMALL)

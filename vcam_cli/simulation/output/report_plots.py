@@ -9,14 +9,20 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.effects.signal_chain import noise_sources
-from vcam_cli.files.plots import COLORS
+from vcam_cli.files.plots import (
+    COLORS,
+    DASHES,
+    GRAY,
+    LIMIT,
+    MARK,
+    SMALL,
+    add_scale,
+    channel_series,
+    color_of,
+)
 from vcam_cli.simulation.frame import Frame
 from vcam_cli.spectra import Spectrum, photons
 
-CHANNEL_COLORS = {"R": "#d55e00", "G": "#009e73", "B": "#0072b2", "Y": "#777777", "W": "#777777"}
-"""Color of a color's curve; others get those that are left."""
-DASHES = {"R": "-", "G": (0, (5, 1.5)), "B": (0, (1.5, 1)), "Y": "-", "W": (0, (4, 1, 1, 1))}
-"""Dashes tell curves apart where colors cannot."""
 LEVELS = 200
 """Signals at which the noise is shown."""
 FREQUENCIES = 161
@@ -37,14 +43,14 @@ def channel_style(frame: Frame) -> list[dict[str, Any]]:
     list of dict
         Keyword arguments of matplotlib, one dict a color.
     """
-    others = iter(COLORS[3:])
+    names = frame.mosaic.colors
     return [
         {
-            "color": CHANNEL_COLORS.get(name) or next(others, "#777777"),
-            "ls": DASHES.get(name, "-"),
+            "color": color_of(series),
+            "ls": DASHES[series % len(DASHES)],
             "label": "all pixels" if name == "Y" else name,
         }
-        for name in frame.mosaic.colors
+        for name, series in zip(names, channel_series(names), strict=True)
     ]
 
 
@@ -99,7 +105,7 @@ def draw_noise_budget(figure: Any, frame: Frame, names: Sequence[str]) -> None:
     axes.set(xscale="log", xlim=(1, signal[-1]), ylim=(0, 100))
     axes.set(xlabel="signal of a pixel [e]", ylabel="share of the variance [%]")
     mark_scene(axes, frame)
-    figure.legend(loc="outside upper left", ncols=3, fontsize=7.5)
+    figure.legend(loc="outside upper left", ncols=3, fontsize=SMALL)
 
 
 def draw_snr(figure: Any, frame: Frame) -> None:
@@ -117,9 +123,9 @@ def draw_snr(figure: Any, frame: Frame) -> None:
     of_time = sum(parts[name] for name in [*temporal, "quantization"])
     axes = figure.add_subplot()
     curves = (
-        ("shot-noise limit", signal, "#777777", (0, (4, 3))),
+        ("shot-noise limit", signal, GRAY, LIMIT),
         ("temporal noise", of_time, COLORS[0], "-"),
-        ("with fixed pattern", sum(parts.values()), COLORS[1], (0, (5, 1.5))),
+        ("with fixed pattern", sum(parts.values()), COLORS[1], DASHES[1]),
     )
     for label, variance, color, dashes in curves:
         snr = 20 * np.log10(signal / np.sqrt(np.maximum(variance, 1e-300)))
@@ -127,7 +133,7 @@ def draw_snr(figure: Any, frame: Frame) -> None:
     axes.set(xscale="log", xlim=(1, signal[-1]))
     axes.set(xlabel="signal of a pixel [e]", ylabel="SNR [dB]")
     mark_scene(axes, frame)
-    axes.legend(fontsize=7.5, loc="upper left")
+    axes.legend(fontsize=SMALL, loc="upper left")
 
 
 def mark_scene(axes: Any, frame: Frame) -> None:
@@ -143,7 +149,7 @@ def mark_scene(axes: Any, frame: Frame) -> None:
     dark = frame.dark_rate * frame.exposure_time
     levels = [level - dark for level in frame.plan.levels if level - dark > 1]
     if levels:
-        axes.axvspan(min(levels), max(levels), ymax=0.03, color="#777777", label="this scene")
+        axes.axvspan(min(levels), max(levels), ymax=0.03, color=GRAY, label="this scene")
 
 
 def draw_spectra(figure: Any, frame: Frame) -> None:
@@ -160,8 +166,8 @@ def draw_spectra(figure: Any, frame: Frame) -> None:
     wavelengths = np.linspace(band.start, band.stop, 401)
     light, responses = photons(frame.scene.white), frame.solved.response.spectra
     above, middle, below = figure.subplots(3, sharex=True)
-    _draw_spectrum(above, light, wavelengths, {"color": "#777777"})
-    above.set(ylabel="photons of white", yticklabels=())
+    _draw_spectrum(above, light, wavelengths, {"color": GRAY})
+    above.set(ylabel="white [photons]", yticklabels=())
     white = frame.white_rate * frame.exposure_time
     for response, electrons, style in zip(responses, white, channel_style(frame), strict=True):
         middle.plot(wavelengths * 1e9, 100 * response.evaluate(wavelengths), lw=1.3, **style)
@@ -169,13 +175,13 @@ def draw_spectra(figure: Any, frame: Frame) -> None:
         whole = _integral(seen, wavelengths)
         unit = electrons / whole / (1 if seen.lines else 1e9) if whole else 0.0
         _draw_spectrum(below, seen.scale_by(unit), wavelengths, style)
-    middle.set_ylabel("electrons per photon [%]")
-    below.set_ylabel("signal of white [e]" if light.lines else "signal of white [e/nm]")
+    middle.set_ylabel("QE [%]")
+    below.set_ylabel("white [e]" if light.lines else "white [e/nm]")
     below.set_xlabel("wavelength [nm]")
     for axes in (above, middle, below):
         axes.set_ylim(bottom=0)
     if len(responses) > 1:
-        middle.legend(fontsize=7.5, ncols=len(responses), loc="upper right")
+        middle.legend(fontsize=SMALL, ncols=len(responses), loc="upper right")
 
 
 def _draw_spectrum(
@@ -233,18 +239,21 @@ def draw_mtf(figure: Any, frame: Frame, names: Sequence[str]) -> None:
         Labels of the effects, in the order of `mtf_parts`.
     """
     frequency, parts = mtf_parts(frame)
+    pitch = frame.geometry.pitch_x
     axes = figure.add_subplot()
-    styles = ((0, (5, 1.5)), (0, (1.5, 1)), (0, (4, 1, 1, 1)), (0, (7, 3)))
     for i, (label, part) in enumerate(zip(names, parts.values(), strict=True)):
         color = COLORS[i % len(COLORS)]
-        axes.plot(frequency / 1e3, part, label=label, color=color, ls=styles[i % 4], lw=1.3)
+        axes.plot(
+            frequency * pitch, part, label=label, color=color, ls=DASHES[i % len(DASHES)], lw=1.3
+        )
     whole = np.prod(list(parts.values()), axis=0)
-    axes.plot(frequency / 1e3, whole, label="all together", color="#777777", lw=2)
-    axes.axvline(frequency[-1] / 2e3, color="#777777", lw=0.9, ls=(0, (1, 2)))
-    axes.text(frequency[-1] / 2e3, 1.02, " Nyquist", fontsize=7.5, va="bottom", ha="center")
-    axes.set(xlabel="spatial frequency on the sensor [lp/mm]", ylabel="MTF")
-    axes.set(xlim=(0, frequency[-1] / 1e3), ylim=(0, 1.1))
-    axes.legend(fontsize=7.5)
+    axes.plot(frequency * pitch, whole, label="product", color=GRAY, lw=2)
+    axes.axvline(0.5, color=GRAY, lw=0.9, ls=MARK)
+    axes.text(0.5, 1.02, " Nyquist", fontsize=SMALL, va="bottom", ha="center")
+    axes.set(xlabel="spatial frequency [cycles/pixel]", ylabel="MTF")
+    axes.set(xlim=(0, frequency[-1] * pitch), ylim=(0, 1.1))
+    axes.legend(fontsize=SMALL)
+    add_scale(axes, "spatial frequency on the sensor [lp/mm]", 1e-3 / pitch)
 
 
 def histogram(frame: Frame) -> tuple[Array, list[Array]]:
@@ -285,8 +294,8 @@ def draw_histogram(figure: Any, frame: Frame) -> None:
     axes = figure.add_subplot()
     for count, style in zip(counts, channel_style(frame), strict=True):
         axes.stairs(count, edges, color=style["color"], ls=style["ls"], label=style["label"])
-    axes.axvline(frame.black_dn, color="#777777", lw=0.9, ls=(0, (1, 2)), label="black level")
+    axes.axvline(frame.black_dn, color=GRAY, lw=0.9, ls=MARK, label="black level")
     axes.set(xlabel="code of the raw frame [DN]", ylabel="pixels", yscale="symlog")
     axes.set(xlim=(edges[0], edges[-1]))
     axes.set_ylim(bottom=0)
-    axes.legend(fontsize=7.5, ncols=2)
+    axes.legend(fontsize=SMALL, ncols=2)

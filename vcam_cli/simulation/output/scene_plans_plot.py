@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from vcam_cli.files.plots import STYLE, load, save
+from vcam_cli.files.plots import plot_figure
 from vcam_cli.simulation.plan import Decision
 from vcam_cli.simulation.scene_plans import (
     NEVER_SKIPPED,
@@ -64,10 +64,6 @@ def plot_scene_plans(path: Path | str, title: str, plans: Sequence[ScenePlan], t
     CannotDo
         Where the file cannot be written.
     """
-    matplotlib = load()
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     names = effect_names(plans)
     width, height = CELL[0] * len(names), CELL[1] * len(plans)
     labels = max(len(each.scene) for each in plans) / CHARACTERS + 0.3
@@ -75,21 +71,19 @@ def plot_scene_plans(path: Path | str, title: str, plans: Sequence[ScenePlan], t
     lines = textwrap.wrap(f"{WORDS} {times}", int((labels + width + BARS - 0.3) * CHARACTERS))
     below = 0.75 + LINE * len(lines)
     whole = labels + width + BARS, above + height + below
-    style: Any = {**matplotlib.rcParamsDefault, **STYLE}
-    with matplotlib.rc_context(style):
-        figure = Figure(figsize=whole, dpi=160, facecolor="white")
-        FigureCanvasAgg(figure)
+    with plot_figure(path, whole, dpi=160, layout=None) as figure:
+        from matplotlib import colormaps
+
         bottom, tall = below / whole[1], height / whole[1]
         cells = figure.add_axes((labels / whole[0], bottom, width / whole[0], tall))
         place = (labels + width + 0.15) / whole[0], bottom, (BARS - 0.25) / whole[0], tall
-        colors = matplotlib.colormaps["Blues"]
+        colors = colormaps["Blues"]
         _cells(cells, names, plans, colors)
         _seconds(figure.add_axes(place), plans)
         ramp = (labels / whole[0], (below - 0.36) / whole[1], 2.0 / whole[0], 0.13 / whole[1])
         _ramp(figure.add_axes(ramp), colors)
         figure.text(0.1 / whole[0], 0.1 / whole[1], "\n".join(lines), size=8.5, va="bottom")
         figure.suptitle(title, x=0.01, y=1 - 0.06 / whole[1], ha="left", va="top", size=10.5)
-        save(figure, path)
 
 
 def _cells(axes: Any, names: Sequence[str], plans: Sequence[ScenePlan], colors: Any) -> None:
