@@ -230,7 +230,9 @@ class Output(Model):
     )
     radiance: Annotated[bool, Strict()] = key(
         "also write radiance.exr: W/(sr m2 nm) of the scene as simulated, a channel a wavelength; a"
-        " scene again with {kind: hyperspectral, file: radiance.exr} and luminance: from-file",
+        " scene again with {kind: hyperspectral, file: radiance.exr} and luminance: from-file; a"
+        " chart is then simulated from the samples that are written, accuracy.oversampling (4) per"
+        " pixel pitch",
         default=False,
     )
     dng: Annotated[bool, Strict()] = key(

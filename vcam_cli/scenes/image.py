@@ -63,14 +63,14 @@ def placement(rows: int, columns: int, view: View) -> Placement:
         pitch = view.scene_width / columns
     # What lies beyond the array is there and is blurred into it: the rest of the picture, and black
     # around one of a stated size. One that covers the array is mirrored where it ends.
-    width, height = _extent_with_margin(view)
+    width, height = extent_with_margin(view)
     cut_x, cut_y = _surplus_samples(columns, width / pitch), _surplus_samples(rows, height / pitch)
     if view.scene_width is None:
         cut_x, cut_y = max(cut_x, 0), max(cut_y, 0)
     return Placement(pitch, cut_x, cut_y)
 
 
-def _extent_with_margin(view: View) -> tuple[float, float]:
+def extent_with_margin(view: View) -> tuple[float, float]:
     """Return width and height of the array and its margin [m]."""
     width, height = view.size
     margin_x = 2 * view.margin * view.pitch_x * (width / view.width)
@@ -294,7 +294,7 @@ def image_scene(
     shape = rows - 2 * placed.cut_y, columns - 2 * placed.cut_x
     pitch_x = pitch_y = placed.pitch
     if view.scene_width is not None:
-        width, height = _extent_with_margin(view)
+        width, height = extent_with_margin(view)
         pitch_x = _visible_pitch(pitch_x, shape[1], width)
         pitch_y = _visible_pitch(pitch_y, shape[0], height)
     return ImageScene(

@@ -103,6 +103,7 @@ def remarks(ready: Prepared) -> tuple[str, ...]:
         *advice(ready),
         *_colors_of_picture(ready),
         *_cropped(ready),
+        *_sampled(ready),
         *_motion(ready),
         *_depth(ready),
         *_edge_without_blur(ready),
@@ -363,10 +364,22 @@ def _steps_not_shown(ready: Prepared) -> tuple[str, ...]:
     return ()
 
 
+def _sampled(ready: Prepared) -> tuple[str, ...]:
+    """Return that a chart is simulated as the samples that are written."""
+    scene = ready.scene
+    if not isinstance(scene, ImageScene) or ready.solved.scene.source.kind != "chart":
+        return ()
+    per_pixel = ready.geometry.pitch_x / scene.pitch_x
+    return (
+        f"output.radiance: the chart is simulated as it is written, in {per_pixel:.3g} samples per"
+        " pixel pitch; accuracy.oversampling sets their number",
+    )
+
+
 def _cropped(ready: Prepared) -> tuple[str, ...]:
     """Return how much of a picture lies beyond the array."""
     scene = _picture(ready)
-    if not isinstance(scene, ImageScene):
+    if not isinstance(scene, ImageScene) or ready.solved.scene.source.kind == "chart":
         return ()
     parts = zip(("height", "width"), scene.seen, strict=True)
     lost = [f"{1 - part:.1%} of its {side}" for side, part in parts if part < 1 - VISIBLE_CROP]

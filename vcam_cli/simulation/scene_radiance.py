@@ -1,9 +1,9 @@
 """The scene as simulated: its spectral radiance, as a file that is a scene again.
 
-Pictures and spectral files are written sample by sample, on the sensor's plane, also beyond the
-array; charts as averages over cells, `CELLS` to a pixel pitch, up to the reach of blurs. A sample
-is the square of light that it is when the file is read: with its width as the scene's extent and
-its radiances as they are, it makes the same frame.
+Pictures, spectral files and charts are written sample by sample, on the sensor's plane, also beyond
+the array: a frame whose radiance is written is simulated from these samples, charts as the picture
+that `scenes.sampled_chart` makes of them. With its width as the scene's extent and its radiances as
+they are, the file makes the same frame.
 
 Values are means over bands that fall straight to 0 at the neighboring wavelengths, so that the
 light between two wavelengths is kept, lines included, whatever spectrum it has.
@@ -12,30 +12,23 @@ light between two wavelengths is kept, lines included, whatever spectrum it has.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.errors import bad
-from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.transfer_functions import Band
-from vcam_cli.scenes import light
-from vcam_cli.scenes.base import ChartScene, HarmonicScene, SampledScene
-from vcam_cli.scenes.build import chart_and_reflectances
-from vcam_cli.scenes.framed import chart_scene
+from vcam_cli.scenes.image import ImageScene
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.spectra import Spectrum, hat_weights
 
 PATH = ("output", "radiance")
-CELLS = 4
-"""Cells of a chart in a pixel pitch: an edge within one is displaced by an eighth pixel at most."""
-MARGIN = 16
-"""Pixels that a chart goes on beyond the array: the reach of sharp lenses' blurs."""
+ROUNDING = 1e-9
+"""Part of a picture that lies beyond the array by rounding alone."""
 STEP = 2e-9
-"""Step of the wavelengths where the camera names none [m]: straight lines between them keep frames
-of the shipped pictures to 4e-7 of the brightest pixel (5 nm: 4e-6)."""
+"""Largest step of the wavelengths [m]: straight lines between them keep frames of the shipped
+pictures to 4e-7 of the brightest pixel (5 nm: 4e-6, 20 nm: 8e-4)."""
 
 
 def check(camera: Camera) -> None:
@@ -52,8 +45,12 @@ def check(camera: Camera) -> None:
         For a scene of several distances.
     """
     if camera.output.radiance and camera.scene.has_distances:
-        message = "a scene of several distances is not one picture of radiances"
-        raise bad(PATH, message, "write radiance: false")
+        message = (
+            "a scene of several distances is not one picture of radiances: near things hide what"
+            " lies behind them, and each point of the lens sees other parts of it"
+        )
+        remedy = "write radiance: false; the scene's own files with their distances hold its light"
+        raise bad(PATH, message, remedy)
 
 
 def nodes(ready: Prepared) -> Array:
@@ -70,11 +67,10 @@ def nodes(ready: Prepared) -> Array:
         Wavelengths (J,), rising [m].
     """
     band = ready.camera.scene.wavelengths
-    step = STEP if band.step is None else ready.settings.wavelength_step
-    return Band(band.start, band.stop, step).nodes()
+    return Band(band.start, band.stop, min(band.step or STEP, STEP)).nodes()
 
 
-def sampled_scene(ready: Prepared) -> SampledScene:
+def sampled_scene(ready: Prepared) -> ImageScene:
     """Return the scene on the grid that is written.
 
     Parameters
@@ -84,7 +80,7 @@ def sampled_scene(ready: Prepared) -> SampledScene:
 
     Returns
     -------
-    SampledScene
+    ImageScene
         Scene of (ny, nx) samples on the sensor's plane.
 
     Raises
@@ -94,28 +90,19 @@ def sampled_scene(ready: Prepared) -> SampledScene:
     """
     check(ready.camera)  # a camera changed in Python was not checked as a file is
     scene = ready.scene
-    if isinstance(scene, SampledScene) and scene.samples == "squares":
-        return scene
-    if isinstance(scene, HarmonicScene):
-        scene = scene.chart
-    margin = MARGIN if ready.geometry.scene_scale else 0
-    view = replace(photon_rate.view(ready.layout.grid, ready.settings, margin), oversampling=CELLS)
-    if isinstance(scene, ChartScene):
-        pitch = view.pitch_x / CELLS, view.pitch_y / CELLS
-        return replace(scene, shape=view.shape, pitch_x=pitch[0], pitch_y=pitch[1])
-    white = light.white_radiance(ready.camera.scene)
-    chart, reflectances = chart_and_reflectances(ready.camera.scene.source, view)
-    return chart_scene(chart, tuple(white.multiply(r) for r in reflectances), white, view)
+    if not isinstance(scene, ImageScene):
+        raise ValueError("the frame was not simulated from samples: output.radiance was false")
+    return scene
 
 
-def planes(ready: Prepared, scene: SampledScene, workers: int) -> Iterator[Array]:
+def planes(ready: Prepared, scene: ImageScene, workers: int) -> Iterator[Array]:
     """Yield the spectral radiance at each of the `nodes`, one by one.
 
     Parameters
     ----------
     ready : Prepared
         Camera that is ready for its frame.
-    scene : SampledScene
+    scene : ImageScene
         Scene of `sampled_scene`.
     workers : int
         Number of threads; the result does not depend on it.
@@ -148,14 +135,14 @@ def band_means(spectra: tuple[Spectrum, ...], wavelengths: Array) -> Array:
     return np.asarray(bands / hat_weights(Spectrum.flat(1.0), wavelengths))
 
 
-def read_back(ready: Prepared, scene: SampledScene) -> str:
+def read_back(ready: Prepared, scene: ImageScene) -> str:
     """Return the keys of a camera file that reads the written file for the same frame.
 
     Parameters
     ----------
     ready : Prepared
         Camera that is ready for its frame.
-    scene : SampledScene
+    scene : ImageScene
         Scene of `sampled_scene`.
 
     Returns
@@ -163,16 +150,14 @@ def read_back(ready: Prepared, scene: SampledScene) -> str:
     str
         Keys of the source, as YAML.
     """
-    scale, extent = ready.geometry.scene_scale, "sensor"
-    if not _covers_the_array(ready, scene):
-        extent = f"{{width: {scene.extent[0] / scale:.12g} m}}"
+    extent = "sensor"
+    if _goes_on(ready, scene):
+        extent = f"{{width: {scene.extent[0] / ready.geometry.scene_scale:.12g} m}}"
     return f"luminance: from-file, extent: {extent}"
 
 
-def _covers_the_array(ready: Prepared, scene: SampledScene) -> bool:
-    """Return whether the grid covers the array alone, or is cropped to do so.
-
-    A chart at infinity has no size in the scene, and so no margin.
-    """
-    is_picture = scene is ready.scene
-    return (is_picture and ready.camera.scene.extent == "sensor") or not ready.geometry.scene_scale
+def _goes_on(ready: Prepared, scene: ImageScene) -> bool:
+    """Return whether the samples have a width of their own, and not that of the array."""
+    if ready.camera.scene.source.kind == "chart":
+        return max(scene.seen) < 1 - ROUNDING
+    return ready.camera.scene.extent != "sensor"

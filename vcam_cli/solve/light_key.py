@@ -60,6 +60,7 @@ def light_key(camera: Camera) -> str:
         if path != moving:
             _drop(form, path)
     form["tolerance"] = camera_settings(camera).tolerance  # not that of the file alone
+    form["sampled"] = camera.output.radiance  # a chart is simulated as it is written
     accuracy = form["accuracy"]  # a preset by itself is written as its name
     if isinstance(accuracy, dict) and set(accuracy) == {"preset"}:
         form["accuracy"] = accuracy["preset"]
