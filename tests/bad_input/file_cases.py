@@ -9,6 +9,11 @@ CASES.add(
     says=[("9:20", "optics.off_axis.file", "is 0.0325 mm from the axis", "up to 0.0325 mm")],
 )
 CASES.add(
+    "a relative illumination of a color that the array does not have",
+    ("f_number: 2.8", "f_number: 2.8\n  off_axis: {Q: {file: lens.csv}}"),
+    says=[("9:17", "optics.off_axis.Q", "Q is no color of the array", "remove Q")],
+)
+CASES.add(
     "a spectrum as relative illumination",
     ("f_number: 2.8", "f_number: 2.8\n  off_axis: {file: short.csv}"),
     says=[("9:20", "optics.off_axis.file", "the header is", "image_height_mm,value")],

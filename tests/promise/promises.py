@@ -114,6 +114,16 @@ pixel:
 array: {pattern: bayer-grbg}
 exposure: {auto: {max: 100 ms}}
 """,
+    "shading by color": """
+scene: {source: {kind: image, file: color.png}, luminance: 300 cd/m2}
+optics:
+  f_number: 2.4
+  focal_length: 4 mm
+  off_axis: {R: {file: red.csv}, G: {file: green.csv}, B: {file: green.csv}}
+pixel: {width: 2 um, photodetector: {fill_factor: 0.7}, readout: {read_noise: 3 e}}
+array: {pattern: bayer-bggr}
+exposure: {auto: {max: 100 ms}}
+""",
     "no diffraction": """
 scene: {source: {kind: image, file: gray.png, model: reflectance}, illuminant: A}
 optics: {diffraction: false, off_axis: none}
@@ -324,7 +334,7 @@ def _merged(base: dict, over: dict) -> dict:
 
 
 def picture_files(folder: Path) -> None:
-    """Pictures with the spectrum of natural ones, 1 / f: color.png and gray.png."""
+    """Pictures with the spectrum of natural ones, 1 / f: color.png and gray.png; and tables."""
     if (folder / "color.png").exists():
         return
     rows, columns = 150, 200
@@ -335,6 +345,9 @@ def picture_files(folder: Path) -> None:
     planes = (np.clip(field, 0, 1) * 65535).astype(np.uint16)
     write_png(folder / "color.png", np.ascontiguousarray(np.moveaxis(planes, 0, 2)))
     write_png(folder / "gray.png", planes[0])
+    for color, fall in (("red", 0.3), ("green", 0.02)):
+        table = f"image_height_mm,value\n0,1\n0.1,{1 - fall / 2}\n1,{1 - fall}\n"
+        (folder / f"{color}.csv").write_text(table, encoding="utf-8")
     y, x = np.indices((24, 32)) - np.array([10, 12])[:, None, None]
     spot = np.exp(-(x**2 + y**2) / 8) + 0.2 * np.exp(-((x - 6) ** 2 + (y - 3) ** 2) / 18)
     write_png(folder / "spread.png", (spot / spot.max() * 65535).astype(np.uint16))

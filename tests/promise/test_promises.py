@@ -71,6 +71,6 @@ def test_random_cameras_keep_every_tolerance(number, absent, tmp_path):
 
 def test_cameras_with_every_effect(tmp_path):
     """Twelve at first, twelve more for what lenses and pixels do; random ones have layers."""
-    assert len(CAMERAS) == 24
+    assert len(CAMERAS) == 25
     named = {name for each in CAMERAS for name in ablation.wanted_effects(made(each, tmp_path))}
     assert named == {kind.name for kind in ORDER} - {"depth"}

@@ -69,6 +69,18 @@ class FalloffFile(Model):
     )
 
 
+_FALLOFF = word_or(FalloffFile, {"exact": "exact", "cos4": "cos4", "none": "none"})
+
+
+def _falloff(given: Any) -> Any:
+    """Return a word, a file, or files by color; raise ValueError with a sentence."""
+    if isinstance(given, Mapping) and any(
+        isinstance(v, Mapping | FalloffFile) for v in given.values()
+    ):
+        return dict(zip(given, read_items(given.items(), FalloffFile.model_validate), strict=True))
+    return _FALLOFF.read(given)
+
+
 def _channels_differ(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
     """Refuse two channels of one wavelength."""
     listed = given.get("wavelengths")
@@ -406,11 +418,15 @@ class Optics(Model):
         "of lens and filters in front of the sensor: a spectrum", example=0.95, default=flat(0.95)
     )
     off_axis: Annotated[
-        Literal["exact", "cos4", "none"] | FalloffFile,
-        word_or(FalloffFile, {"exact": "exact", "cos4": "cos4", "none": "none"}),
+        Literal["exact", "cos4", "none"] | FalloffFile | Mapping[str, FalloffFile],
+        Either(
+            _falloff,
+            Literal["exact", "cos4", "none"] | FalloffFile | dict[str, FalloffFile],
+        ),
     ] = key(
         "falloff of light away from the axis: exact (uniform Lambertian disk), cos4, none, or "
-        "measured",
+        "measured, {file: relative-illumination.csv}; of each filter color, as shading tables of a "
+        "camera have it, {R: {file: red.csv}, G: {file: green.csv}, B: {file: blue.csv}}",
         default="exact",
     )
     exit_pupil_distance: Annotated[

@@ -6,6 +6,7 @@ What the draws of noise, the clamps and the ADC make of it is in `signal_chain.p
 from __future__ import annotations
 
 from abc import abstractmethod
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -15,7 +16,40 @@ from vcam_cli.effects.base import Effect
 
 
 class Gain(Effect):
-    """A factor on the photo signal that varies slowly over the array."""
+    """A factor on the photo signal that varies slowly over the array, in each color."""
+
+    is_neutral: ClassVar[bool] = False
+    """Whether all colors have the same factor."""
+
+    @abstractmethod
+    def of_color(self, color: str) -> NeutralGain:
+        """Return the gain of one color.
+
+        Parameters
+        ----------
+        color : str
+            Name of the color in the mosaic.
+
+        Returns
+        -------
+        NeutralGain
+            Its gain; the gain itself where all colors have the same.
+        """
+
+    @property
+    def on_axis(self) -> float:
+        """The factor at the center of the sensor, where white is judged: 1 by color."""
+        return 1.0
+
+
+class NeutralGain(Gain):
+    """A gain that is the same in all colors."""
+
+    is_neutral = True
+
+    def of_color(self, color: str) -> Self:
+        """Return the gain itself."""
+        return self
 
     @abstractmethod
     def gain(self, x: Array, y: Array) -> Array:

@@ -207,10 +207,15 @@ def _range_of_gains(path: OpticalPath, gains: Collection[Gain]) -> tuple[float, 
     """Return the least and the largest product of gains over the array, 1 on the axis."""
     g = path.geometry
     x, y = (np.linspace(-size / 2, size / 2, PLACES) for size in (g.sensor_width, g.sensor_height))
-    product = np.ones((1, 1))
+    colors = path.mosaic.colors
+    products = [np.ones((1, 1))] * (1 if all(gain.is_neutral for gain in gains) else len(colors))
     for gain in gains:
-        product = product * gain.gain(x, y) / (gain.on_axis or 1.0)
-    return float(product.min()), float(product.max())
+        axis = gain.on_axis or 1.0
+        products = [
+            product * gain.of_color(color).gain(x, y) / axis
+            for color, product in zip(colors, products, strict=False)
+        ]
+    return float(min(p.min() for p in products)), float(max(p.max() for p in products))
 
 
 def _range_of_light(scene: AnyScene) -> tuple[float, float]:

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -140,8 +141,7 @@ def _gathered(path: OpticalPath, scene: AnyScene, planes: bool) -> Rate:
 
     def apply_gains(effects: Sequence[Gain], block: slice) -> None:
         for effect in effects:
-            factor = effect.gain(x, y[block])
-            out[:, block] *= factor if on_axis[effect] == 1 else factor * on_axis[effect]
+            _attenuate(out[:, block], effect, (x, y[block]), mosaic, block.start, on_axis[effect])
 
     def add(layer: Layer, first: bool, block: slice) -> None:
         if first and layer.weight is None:
@@ -189,6 +189,32 @@ def _fill(tile: Array, layer: Layer, mosaic: Mosaic, block: slice) -> None:
             found = layer.values(color, slice(row, block.stop, period))
             for columns in places:
                 tile[0, phase::period, columns] = found[:, columns]
+
+
+def _attenuate(
+    tile: Array,
+    gain: Gain,
+    places: tuple[Array, Array],
+    mosaic: Mosaic,
+    first: int,
+    scale: float | np.floating[Any],
+) -> None:
+    """Multiply rows of light from the row `first` on by a gain at their places x, y [m]."""
+    x, y = places
+    if gain.is_neutral:
+        factor = gain.of_color(mosaic.colors[0]).gain(x, y)
+        tile *= factor if scale == 1 else factor * scale
+        return
+    if len(tile) > 1:
+        for name, plane in zip(mosaic.colors, tile, strict=True):
+            plane *= gain.of_color(name).gain(x, y)
+        return
+    period = len(mosaic.block)
+    for phase in range(min(period, len(y))):
+        for color, found in mosaic.row_colors(first + phase):
+            for columns in found:
+                factor = gain.of_color(mosaic.colors[color]).gain(x[columns], y[phase::period])
+                tile[0, phase::period, columns] *= factor
 
 
 def _spread(rate: Array, mosaic: Mosaic, glare: VeilingGlare) -> None:

@@ -6,7 +6,7 @@ thousand pixels, what each of them changes.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,7 +94,8 @@ def changes_by_omission(
     x, y = pixel_centers(geometry)
     colors = _colors(mosaic, np.arange(rate.shape[0])[rows], np.arange(rate.shape[1])[columns])
     on_pixels: dict[Effect, _Factors | _Glare] = {
-        e: _Factors(e.gain(x[columns], y[rows])) for e in of_kind(present, Gain)
+        e: _Factors(_factors(e, x[columns], y[rows], dict(zip(mosaic.colors, colors, strict=True))))
+        for e in of_kind(present, Gain)
     }
     on_pixels |= {e: _Glare(e.fraction, colors) for e in of_kind(present, VeilingGlare)}
     ordered = [e for e in present if e in on_pixels]
@@ -168,6 +169,16 @@ def _colors(mosaic: Mosaic, rows: Array, columns: Array) -> list[Array]:
     block = np.array(mosaic.block)
     names = block[np.ix_(rows % block.shape[0], columns % block.shape[1])]
     return [names == color for color in mosaic.colors]
+
+
+def _factors(gain: Gain, x: Array, y: Array, colors: Mapping[str, Array]) -> Array:
+    """Return a gain at pixels in columns x and rows y [m], each with that of its color."""
+    if gain.is_neutral:
+        return gain.of_color("").gain(x, y)
+    out = np.ones((len(y), len(x)))
+    for color, pixels in colors.items():
+        out = np.where(pixels, gain.of_color(color).gain(x, y), out)
+    return out
 
 
 def _every_nth(count: int, shape: tuple[int, ...]) -> slice:

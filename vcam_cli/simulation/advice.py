@@ -25,7 +25,7 @@ UNUSED_WELL = 0.1
 
 
 def advice(ready: Prepared) -> Iterator[str]:
-    """Yield notes on infrared light, on dark renders, and on wells that the ADC ends.
+    """Yield notes on infrared light, dark renders, wells that the ADC ends, and irradiance.
 
     Parameters
     ----------
@@ -40,6 +40,7 @@ def advice(ready: Prepared) -> Iterator[str]:
     yield from _infrared(ready)
     yield from _dark_render(ready)
     yield from _unused_well(ready)
+    yield from _even_irradiance(ready)
 
 
 def _infrared(ready: Prepared) -> Iterator[str]:
@@ -95,3 +96,14 @@ def _unused_well(ready: Prepared) -> Iterator[str]:
         " it, and not the well, ends the dynamic range; to convert all of the well write"
         f" adc.gain: {codes / circuit.full_well:.4g} DN/e"
     )
+
+
+def _even_irradiance(ready: Prepared) -> Iterator[str]:
+    """Yield that the irradiance in front of the filters lacks a falloff measured behind them."""
+    output = ready.solved.output
+    by_color = any(not gain.is_neutral for gain in of_kind(ready.plan.active, Gain))
+    if by_color and (output.irradiance or output.isetcam):
+        yield (
+            "the irradiance is the light in front of the filters: the tables of optics.off_axis by"
+            " color, which are measured behind them, are not in it"
+        )

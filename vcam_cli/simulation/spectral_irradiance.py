@@ -30,7 +30,7 @@ from vcam_cli.camera.simulation import Output
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.blurs import Blur
 from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
-from vcam_cli.effects.pixel_signal import Gain, VeilingGlare
+from vcam_cli.effects.pixel_signal import NeutralGain, VeilingGlare
 from vcam_cli.errors import bad
 from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.optical_path import Layer, OpticalPath
@@ -149,7 +149,7 @@ def _bands(ready: Prepared, wavelengths: Array, level: Array, workers: int) -> I
     )
     dtype = ready.settings.dtype
     x, y = pixel_centers(g)
-    gains = [e.gain(x.astype(dtype), y.astype(dtype)) for e in of_kind(in_lens, Gain)]
+    gains = [e.gain(x.astype(dtype), y.astype(dtype)) for e in of_kind(in_lens, NeutralGain)]
     out: Array = np.zeros((len(wavelengths), g.rows, g.columns), dtype)
     layers, _ = image_layers(light, _scene(ready))
     for layer in layers:

@@ -9,7 +9,7 @@ References
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -135,7 +135,7 @@ def curves(camera: Camera, abscissa: str, nyquist: float) -> tuple[Curves, ...]:
         return tuple(_mtf(camera, nyquist))
     if abscissa == WAVELENGTH:
         return tuple(_quantum_efficiency(camera))
-    return (_diagonal_curves(camera),)
+    return tuple(_diagonal_curves(camera))
 
 
 def _mtf(camera: Camera, nyquist: float) -> list[Curves]:
@@ -182,8 +182,8 @@ def _quantum_efficiency(camera: Camera) -> list[Curves]:
     return found
 
 
-def _diagonal_curves(camera: Camera) -> Curves:
-    """Return what pixels along the diagonal collect, positions positive to the lower right.
+def _diagonal_curves(camera: Camera) -> Iterator[Curves]:
+    """Yield what pixels along the diagonal collect, positions positive to the lower right.
 
     Raises BadInput where all pixels collect alike.
     """
@@ -199,19 +199,23 @@ def _diagonal_curves(camera: Camera) -> Curves:
     part, ones = np.linspace(-1, 1, POSITIONS), np.ones(POSITIONS)
     x, y = part * g.sensor_width / 2, part * g.sensor_height / 2
     efficiency = ones if tunnel is None else _tunnel_transmission(tunnel, x, y)
-    illumination = ones if falloff is None else np.diagonal(falloff.gain(x, y)) / falloff.on_axis
     relative = efficiency / efficiency[POSITIONS // 2]
     position = part * math.hypot(g.sensor_width, g.sensor_height) / 2
-    return Curves(
-        "",
-        {POSITION: position * 1e3},
-        {
-            "relative_qe": relative,
-            "qe_over_no_vignetting": efficiency,
-            "lens_falloff": illumination,
-            "relative_signal": relative * illumination,
-        },
-    )
+    colors = camera_layout(camera, g).mosaic.colors
+    for color in colors[: 1 if falloff is None or falloff.is_neutral else None]:
+        illumination = ones
+        if falloff is not None:
+            illumination = np.diagonal(falloff.of_color(color).gain(x, y)) / falloff.on_axis
+        yield Curves(
+            "" if falloff is None or falloff.is_neutral else color,
+            {POSITION: position * 1e3},
+            {
+                "relative_qe": relative,
+                "qe_over_no_vignetting": efficiency,
+                "lens_falloff": illumination,
+                "relative_signal": relative * illumination,
+            },
+        )
 
 
 def _tunnel_transmission(tunnel: PixelVignetting, x: Array, y: Array) -> Array:

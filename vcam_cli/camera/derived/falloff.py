@@ -8,11 +8,12 @@ from vcam_cli.camera.derived.geometry import Geometry, geometry
 from vcam_cli.camera.derived.prescription import illumination, sensor_view, traced_lens
 from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.optics import FalloffFile
-from vcam_cli.errors import bad, data_file_problems
+from vcam_cli.errors import Path, bad, data_file_problems
 from vcam_cli.spectra.text import read_rows
 
 HEADER = ("image_height_mm", "value")
-PATH = ("optics", "off_axis", "file")
+SECTION = ("optics", "off_axis")
+PATH = (*SECTION, "file")
 REMEDY = "write the columns image_height_mm,value, heights rising from 0"
 SLACK = 1e-9
 """By how much the last height may miss the corner, relative: rounding."""
@@ -37,18 +38,42 @@ def falloff(camera: CameraModel, geometry: Geometry) -> Falloff | None:
     the array.
     """
     given = camera.optics.off_axis
+    if isinstance(given, FalloffFile):
+        return _read(given, geometry, PATH)
     if given == "exact" and (lens := traced_lens(camera)):
         view = sensor_view(lens, geometry.object_distance, camera.optics.defocus)
         corner = float(np.hypot(geometry.sensor_width, geometry.sensor_height)) / 2
         traced = illumination(view, corner)
         return Falloff(traced.heights, traced.values, is_traced=True)
-    if not isinstance(given, FalloffFile):
-        return None
-    heights, values = _table(given.file)
+    return None
+
+
+def falloffs_by_color(camera: CameraModel, geometry: Geometry) -> dict[str, Falloff]:
+    """Return the tables of the filter colors; empty where the file has none of each color.
+
+    Raises BadInput where colors are not those of the array, and as `falloff` does.
+    """
+    given = camera.optics.off_axis
+    if isinstance(given, str | FalloffFile):
+        return {}
+    colors = camera.array.colors or tuple(camera.array.filters)
+    for color in given:
+        if color not in colors:
+            message = f"{color} is no color of the array, which has {', '.join(colors)}"
+            raise bad((*SECTION, color), message, f"remove {color}")
+    if missing := [color for color in colors if color not in given]:
+        message = f"has no table for {', '.join(missing)}"
+        raise bad(SECTION, message, f"add {missing[0]}: {{file: relative-illumination.csv}}")
+    return {c: _read(own, geometry, (*SECTION, c, "file")) for c, own in given.items()}
+
+
+def _read(given: FalloffFile, geometry: Geometry, path: Path) -> Falloff:
+    """Return the table of a file that a key names. Raises BadInput."""
+    heights, values = _table(given.file, path)
     corner = float(np.hypot(geometry.sensor_width, geometry.sensor_height)) / 2
     if heights[-1] < corner * (1 - SLACK):
         raise bad(
-            PATH,
+            path,
             f"ends at an image height of {heights[-1] * 1e3:.6g} mm, but the corner of the array"
             f" is {corner * 1e3:.6g} mm from the axis",
             f"add rows up to {corner * 1e3:.6g} mm, or make the array smaller",
@@ -58,13 +83,16 @@ def falloff(camera: CameraModel, geometry: Geometry) -> Falloff | None:
 
 def check(camera: CameraModel) -> None:
     """Raise BadInput where the relative illumination is not to be had."""
-    if isinstance(camera.optics.off_axis, FalloffFile):
+    given = camera.optics.off_axis
+    if isinstance(given, FalloffFile):
         falloff(camera, geometry(camera))
+    elif not isinstance(given, str):
+        falloffs_by_color(camera, geometry(camera))
 
 
-def _table(file: str) -> tuple[np.ndarray, np.ndarray]:
+def _table(file: str, path: Path) -> tuple[np.ndarray, np.ndarray]:
     """Return heights [m] and values of the file. Raises BadInput."""
-    with data_file_problems(file, PATH, REMEDY):
+    with data_file_problems(file, path, REMEDY):
         header, rows = read_rows(file)
         if tuple(header) != HEADER:
             raise ValueError(f"{file}: the header is {','.join(header)!r}")

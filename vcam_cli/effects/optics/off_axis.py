@@ -3,7 +3,8 @@
     E(phi) / E(0) = (1 + a) / (2 a) (1 - A / sqrt(A^2 + 4 a)),   A = 1 - a + b
 
 with a the squared tangent of half the image-side cone, 1 / (4 N^2 (1 - m)^2), and b that of the
-angle phi off the axis. For a small aperture it is cos^4(phi), which `cos4` always takes.
+angle phi off the axis. For a small aperture it is cos^4(phi), which `cos4` always takes. Measured
+tables of all light, or of each filter color, take its place.
 """
 
 from __future__ import annotations
@@ -17,10 +18,10 @@ from numpy.typing import ArrayLike
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.derived.falloff import falloff
+from vcam_cli.camera.derived.falloff import Falloff, falloff, falloffs_by_color
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import SignalLevels
-from vcam_cli.effects.pixel_signal import Gain
+from vcam_cli.effects.pixel_signal import Gain, NeutralGain
 from vcam_cli.floats import rms
 from vcam_cli.physics import radiometry
 
@@ -29,7 +30,7 @@ ENTRIES = 1 << 17
 
 
 @dataclass(frozen=True)
-class OffAxis(Gain):
+class OffAxis(NeutralGain):
     """Relative illumination E(phi)/E(0) of the image plane."""
 
     model: str
@@ -53,8 +54,10 @@ class OffAxis(Gain):
         if camera.optics.off_axis == "none":
             return None
         if measured := falloff(camera, geometry):
-            source = "traced" if measured.is_traced else "measured"
-            return MeasuredFalloff(measured.heights, measured.values, *half, source)
+            return MeasuredFalloff.of(measured, geometry)
+        if by_color := falloffs_by_color(camera, geometry):
+            found = {c: MeasuredFalloff.of(own, geometry) for c, own in by_color.items()}
+            return ColorFalloff(tuple(found.items()))
         tan2_cone = 1 / (4 * geometry.working_f_number**2)
         model = "cos4" if camera.optics.off_axis == "cos4" else "exact"
         return cls(model, tan2_cone, geometry.image_distance, *half)
@@ -112,7 +115,7 @@ class OffAxis(Gain):
 
 
 @dataclass(frozen=True)
-class MeasuredFalloff(Gain):
+class MeasuredFalloff(NeutralGain):
     """Relative illumination over the distance from the axis, straight between measured points."""
 
     heights: tuple[float, ...]
@@ -136,13 +139,28 @@ class MeasuredFalloff(Gain):
         found = OffAxis.from_camera(camera, geometry)
         return found if isinstance(found, cls) else None
 
+    @classmethod
+    def of(cls, found: Falloff, geometry: Geometry) -> Self:
+        """Return the effect of a table.
+
+        Parameters
+        ----------
+        found : Falloff
+            Relative illumination over the distance from the axis.
+        geometry : Geometry
+            Geometry of the array.
+        """
+        half = geometry.sensor_width / 2, geometry.sensor_height / 2
+        return cls(found.heights, found.values, *half, "traced" if found.is_traced else "measured")
+
+    @property
+    def corner_value(self) -> float:
+        """Relative illumination of the corners."""
+        return float(self._relative_illumination(np.hypot(self.half_width, self.half_height)))
+
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
-        corner = float(self._relative_illumination(np.hypot(self.half_width, self.half_height)))
-        kind = "darker" if corner <= 1 else "brighter"
-        return (
-            f"{self.origin_of_points}: corners {100 * abs(1 - corner):.3g} % {kind} than the center"
-        )
+        return f"{self.origin_of_points}: corners {_against_center(self.corner_value)}"
 
     def _relative_illumination(self, radius: Array | float) -> Array:
         return np.asarray(np.interp(radius, self.heights, self.values))
@@ -178,6 +196,49 @@ class MeasuredFalloff(Gain):
             np.sqrt(_quadrant(self.half_width, self.half_height))
         )
         return 1.002 * rms(change) * signal.full_signal
+
+
+@dataclass(frozen=True)
+class ColorFalloff(Gain):
+    """Relative illumination of each filter color, as a lens and pixels with filters have it.
+
+    Light meets the filters and microlenses of the corners at an angle, which passes less of some
+    colors. It is part of the pixels: the irradiance in front of the filters does not have it.
+    """
+
+    by_color: tuple[tuple[str, MeasuredFalloff], ...]
+    """The name of each color and its falloff."""
+
+    name = OffAxis.name
+    reference = MeasuredFalloff.reference
+    absent = OffAxis.absent
+    origin = "pixel"
+    seconds_per_pixel = OffAxis.seconds_per_pixel
+
+    @classmethod
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
+        """Return the falloff where the file has one of each color, else None."""
+        found = OffAxis.from_camera(camera, geometry)
+        return found if isinstance(found, cls) else None
+
+    def of_color(self, color: str) -> MeasuredFalloff:
+        """Return the falloff of one color."""
+        return dict(self.by_color)[color]
+
+    def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
+        corners = (f"{c} {_against_center(own.corner_value)}" for c, own in self.by_color)
+        return f"measured by color: corners {', '.join(corners)}"
+
+    def mean_error(self, signal: SignalLevels) -> float:
+        """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
+        return max(own.mean_error(signal) for _, own in self.by_color)
+
+
+def _against_center(corner: float) -> str:
+    """Return how the corners are, relative to the center."""
+    kind = "darker" if corner <= 1 else "brighter"
+    return f"{100 * abs(1 - corner):.3g} % {kind} than the center"
 
 
 def _quadrant(half_width: float, half_height: float) -> Array:

@@ -21,11 +21,11 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import SignalLevels
-from vcam_cli.effects.pixel_signal import Gain
+from vcam_cli.effects.pixel_signal import NeutralGain
 
 
 @dataclass(frozen=True)
-class Microlens(Gain):
+class Microlens(NeutralGain):
     """Collecting area over area of the photodetector."""
 
     ratio: float

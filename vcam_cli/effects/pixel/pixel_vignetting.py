@@ -28,7 +28,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived import pixel_layout
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import SignalLevels
-from vcam_cli.effects.pixel_signal import Gain
+from vcam_cli.effects.pixel_signal import NeutralGain
 from vcam_cli.floats import rms
 from vcam_cli.physics import vignetting
 
@@ -45,7 +45,7 @@ NARROWEST = 1e-6
 
 
 @dataclass(frozen=True)
-class PixelVignetting(Gain):
+class PixelVignetting(NeutralGain):
     """Share of the light that reaches the photodetectors through their tunnels. Lengths in [m]."""
 
     layers: tuple[tuple[float, float], ...]

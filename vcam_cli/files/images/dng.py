@@ -140,7 +140,7 @@ class RawImage:
     warp: Array | None
     """Coefficients of WarpRectilinear (N, 6); None where the lens does not distort."""
     shading: Array | None
-    """Factors (M, N) that make even light even, at places from edge to edge; None for 1."""
+    """Factors that make even light even, as `dng_opcodes.gain_maps` takes them; None for 1."""
     noise: tuple[float, float]
     """Variance of a level from 0 (black) to 1 (white): so much times the level, and so much
     more."""
@@ -252,8 +252,7 @@ def _tags(image: RawImage) -> list[Tag]:
     if image.warp is not None:
         said["OpcodeList3"] = warp_rectilinear(image.warp)
     if image.shading is not None:
-        block = (len(image.block), len(image.block[0])) if image.block else (1, 1)
-        said["OpcodeList2"] = gain_maps(image.codes.shape, block, image.shading)
+        said["OpcodeList2"] = gain_maps(image.codes.shape, image.shading)
     if image.table is not None:
         said["LinearizationTable"] = image.table
     if image.colors is not None:

@@ -12,19 +12,19 @@ from vcam_cli.arrays import Array
 _WARP_RECTILINEAR, _GAIN_MAP, _SINCE, _MAY_BE_SKIPPED = 1, 9, 0x01030000, 1
 
 
-def gain_maps(shape: tuple[int, ...], block: tuple[int, int], gains: Array) -> bytes:
+def gain_maps(shape: tuple[int, ...], gains: Array) -> bytes:
     """Return an OpcodeList2 that multiplies a raw frame, after its black is subtracted.
 
     Parameters
     ----------
     shape : tuple of int
         Rows and columns of the frame; with the number of colors where every pixel has all.
-    block : (int, int)
-        Rows and columns of the block of colors that repeats; (1, 1) without a mosaic. Every
-        place in it has a map of its own: converters look for them so, though all are alike.
     gains : ndarray
-        Factors (M, N) at places that lie evenly from edge to edge of the frame; converters
-        interpolate between them bilinearly.
+        Factors (R, C, P, M, N) at M x N places that lie evenly from edge to edge of the frame;
+        converters interpolate between them bilinearly. R and C are the rows and columns of the
+        block of colors that repeats, 1 without a mosaic. Every place in it has a map of its own:
+        converters look for them so, even where all are alike. P is the number of colors where
+        every pixel has all and they differ, else 1.
 
     Returns
     -------
@@ -32,12 +32,13 @@ def gain_maps(shape: tuple[int, ...], block: tuple[int, int], gains: Array) -> b
         The value of the tag.
     """
     rows, columns, *planes = shape
-    points = gains.shape
-    values = np.ascontiguousarray(gains, ">f4").tobytes()
+    block, own, points = gains.shape[:2], gains.shape[2], gains.shape[3:]
+    together = 1 if own > 1 or not planes else planes[0]
     maps = []
-    for top, left in np.ndindex(block):
+    for top, left, plane in np.ndindex(*block, own):
+        values = np.ascontiguousarray(gains[top, left, plane], ">f4").tobytes()
         area = struct.pack(">4L", top, left, rows, columns)
-        acts_on = struct.pack(">4L", 0, planes[0] if planes else 1, *block)
+        acts_on = struct.pack(">4L", plane, together, *block)
         spacing = (1 / (count - 1) for count in points)
         grid = struct.pack(">2L4dL", *points, *spacing, 0.0, 0.0, 1)
         said = area + acts_on + grid + values

@@ -194,14 +194,25 @@ def _srgb_codes(light: Array) -> Array:
 
 
 def _shading(frame: Frame) -> Array | None:
-    """Return how much brighter the axis is than places from edge to edge; None where it is not."""
+    """Return how much brighter the axis is than places from edge to edge; None where it is not.
+
+    It is by place in the block of colors and by color plane, as `dng_opcodes.gain_maps` takes it.
+    """
     gains, g = of_kind(frame.plan.active, Gain), frame.layout.grid
     half_width, half_height = g.columns * g.pitch_x / 2, g.rows * g.pitch_y / 2
     x, y = (np.linspace(-half, half, MAP_POINTS) for half in (half_width, half_height))
-    share, axis = np.ones((MAP_POINTS, MAP_POINTS)), np.zeros(1)
+    colors = frame.mosaic.colors[: 1 if all(effect.is_neutral for effect in gains) else None]
+    share, axis = dict.fromkeys(colors, np.ones((MAP_POINTS, MAP_POINTS))), np.zeros(1)
     for effect in gains:
-        share *= effect.gain(x, y) / effect.gain(axis, axis)
-    return None if np.ptp(share) == 0 else 1 / np.maximum(share, 1 / LARGEST_GAIN)
+        for color in colors:
+            gain = effect.of_color(color)
+            share[color] = share[color] * gain.gain(x, y) / gain.gain(axis, axis)
+    if all(np.ptp(of_color) == 0 for of_color in share.values()):
+        return None
+    found = {c: 1 / np.maximum(of_color, 1 / LARGEST_GAIN) for c, of_color in share.items()}
+    if not frame.solved.has_mosaic:
+        return np.stack(list(found.values()))[None, None]
+    return np.array([[[found.get(c, found[colors[0]])] for c in row] for row in frame.mosaic.block])
 
 
 def _warp(frame: Frame) -> Array | None:
