@@ -157,3 +157,13 @@ def test_says_which_file_is_wrong(tmp_path):
 def test_refuses_what_is_no_table(given, tmp_path):
     with pytest.raises(BadInput):
         camera(tmp_path, {"optics.off_axis": given, "array.pattern": "bayer-rggb"})
+
+
+def test_tables_by_color_replace_one_table(tmp_path, monkeypatch):
+    """An override leaves nothing of the table it replaces, and the other way round."""
+    monkeypatch.chdir(tmp_path)
+    by_color = files(tmp_path)
+    one = camera(tmp_path, {"optics.off_axis": {"file": "R.csv"}, "array.pattern": "bayer-rggb"})
+    several = one.with_({"optics.off_axis": by_color})
+    assert set(several.optics.off_axis) == {"R", "G", "B"}
+    assert several.with_({"optics.off_axis": {"file": "R.csv"}}).optics == one.optics
