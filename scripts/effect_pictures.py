@@ -204,6 +204,10 @@ EXAMPLES = {
         _noise("pixel.fpn.shading={offset: 8 e, cycles: 3}"),
         "Slow offsets of 8 electrons rms, the same in every frame.",
     ),
+    "fpn_maps": Example(
+        _noise("pixel.fpn.offset_map=scripts/rings.npy"),
+        "Offsets from a file, here rings of 8 electrons rms, the same in every frame.",
+    ),
     "reset_noise": Example(
         _noise("pixel.readout.reset_noise=12 e"), "12 electrons rms of uncertain reset."
     ),

@@ -41,10 +41,12 @@ PLAIN: dict[str, Any] = {
 }
 """Monochromatic light on a monochrome array: no noise but that of light, no falloff."""
 
+RINGS = str(Path(__file__).parent.parent / "scripts" / "rings.npy")
+"""A map of 120 x 160 pixels, for measured fixed patterns."""
 QUIET = {
     name: "off"
     for name in (
-        *("shot_noise", "fpn", "fpn_shading", "reset_noise", "read_noise"),
+        *("shot_noise", "fpn", "fpn_shading", "fpn_maps", "reset_noise", "read_noise"),
         *("heavy_tailed_noise", "correlated_row_noise", "telegraph_noise", "adc_noise"),
     )
 }

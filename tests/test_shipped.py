@@ -138,15 +138,16 @@ def test_the_benchmark_camera():
 def test_everything_has_every_effect_of_its_architecture():
     """But for what a CCD has, depth, which is of a scene, and what its read noise includes.
 
-    Its lens does not distort and has no low-pass filter, its pixels have no crosstalk, and a drain
-    takes all excess charge: the figures of README are of that. Its pan has the motion.
+    Its lens does not distort and has no low-pass filter, its pixels have no crosstalk and no
+    measured pattern, and a drain takes all excess charge: the figures of README are of that. Its
+    pan has the motion.
     """
     camera = load("everything")
     described = camera_effects(camera, geometry(camera)).found
     missing = {name for name, effect in described.items() if effect is None}
     assert missing == {
         *("charge_transfer", "reset_noise", "depth", "adc_noise", "distortion", "lateral_color"),
-        *("crosstalk", "jitter", "blooming", "low_pass"),
+        *("crosstalk", "jitter", "blooming", "low_pass", "fpn_maps"),
     }
     assert camera.effects == "auto"
 

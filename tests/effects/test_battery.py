@@ -21,6 +21,7 @@ from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.simulation import EFFECTS
 from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.blurs import RadialTransfer, SeparableTransfer
+from vcam_cli.effects.noise.fpn_maps import PatternMaps
 from vcam_cli.effects.optics.depth import Depth
 from vcam_cli.effects.order import ORDER
 from vcam_cli.effects.pixel_signal import (
@@ -36,6 +37,7 @@ from vcam_cli.effects.signal_chain import Limit, NoiseSource, Quantizer, Site
 from vcam_cli.effects.warps import Warp
 from vcam_cli.image_formation.neighbor_sharing import spread
 from vcam_cli.rng import BLOCK_ROWS, stream
+from vcam_cli.simulation.checks import read_maps
 
 # Twenty whole periods on the 64 columns of 5 um, so that its rms is that of a whole wave.
 WAVE = {"kind": "chart", "chart": "sinusoid", "frequency": "62.5 lp/mm", "contrast": 1, "mean": 0.5}
@@ -60,6 +62,8 @@ class Case:
     wavelengths: tuple[float, ...] = (1e-9, 550e-9, 1e-3)
 
 
+PATTERN = "pattern.npy"
+"""A map of the pixels that lies beside every camera."""
 CASES: dict[str, Case] = {
     "diffraction": Case({}, {"optics.diffraction": False}, {"scene.source": WAVE}),
     "aberration": Case(
@@ -185,6 +189,7 @@ CASES: dict[str, Case] = {
         {"pixel.fpn.shading": {"offset": "6 e", "gain": "1 %", "cycles": 3}},
         {"pixel.fpn.shading": {"offset": "0 e"}},
     ),
+    "fpn_maps": Case({"pixel.fpn.offset_map": PATTERN}, {"pixel.fpn": {"offset_pixel": "0 e"}}),
     "heavy_tailed_noise": Case(
         {"pixel.readout.heavy_tailed_noise": {"rms": "9 e", "shape": -0.1}},
         {"pixel.readout.heavy_tailed_noise": {"rms": "0 e"}},
@@ -202,7 +207,8 @@ CASES: dict[str, Case] = {
     "quantization": Case({}, None),
 }
 
-DRAWS = [kind for kind in ORDER if issubclass(kind, NoiseSource)]
+DRAWS = [kind for kind in ORDER if issubclass(kind, NoiseSource) and kind is not PatternMaps]
+"""Noise that is drawn: a measured pattern is known, see test_fpn_maps.py."""
 DARK = 40.0
 """Mean dark signal where noise is drawn [electrons]."""
 
@@ -213,9 +219,18 @@ def every(*bases: type) -> pytest.MarkDecorator:
     return pytest.mark.parametrize("kind", kinds, ids=[kind.name for kind in kinds])
 
 
+@pytest.fixture(autouse=True)
+def _pattern(tmp_path):
+    np.save(tmp_path / PATTERN, np.random.default_rng(3).normal(0, 30, (160, 64)))
+
+
+every_draw = pytest.mark.parametrize("kind", DRAWS, ids=[kind.name for kind in DRAWS])
+
+
 def effect_of(kind, folder, changes=None):
     """The effect with the numbers of the camera that has it (further changed)."""
     made = camera(folder, CASES[kind.name].has | (changes or {}))
+    made = made.with_samples(read_maps(made))
     return kind.from_camera(made, geometry(made))
 
 
@@ -350,7 +365,7 @@ def test_charge_is_electrons_a_second(kind, tmp_path):
         np.testing.assert_allclose(on - off, rate * time, rtol=1e-9)
 
 
-@every(NoiseSource, Limit, Quantizer)
+@pytest.mark.parametrize("kind", [*DRAWS, *(k for k in ORDER if issubclass(k, (Limit, Quantizer)))])
 def test_electrons_in_electrons_out(kind, tmp_path):
     """A draw, a limit or a code keeps shape and float type; a code gives whole numbers."""
     effect = effect_of(kind, tmp_path)
@@ -372,7 +387,7 @@ def test_electrons_in_electrons_out(kind, tmp_path):
 # --- variance ------------------------------------------------------------------------------------
 
 
-@every(NoiseSource)
+@every_draw
 @pytest.mark.parametrize("mean", [0.0, 0.4, 6.0, 30.0, 2e4])
 def test_stated_variance_is_the_measured_one(kind, mean, tmp_path):
     """One row of 200 000 pixels, so that draws per column are as many as those per pixel; of noise
@@ -431,7 +446,7 @@ def test_contribution_bounds_the_ablation(kind, tmp_path):
 # --- keys ----------------------------------------------------------------------------------------
 
 
-@every(NoiseSource)
+@every_draw
 def test_deterministic_under_its_key(kind, tmp_path):
     """Same seed and block, same bytes; another seed, or another block, other numbers."""
     effect = effect_of(kind, tmp_path)
@@ -445,7 +460,7 @@ def test_deterministic_under_its_key(kind, tmp_path):
     assert kind.scope in ("frame", "sensor")
 
 
-@every(NoiseSource)
+@every_draw
 def test_streams_carry_its_name(kind, tmp_path):
     """No two effects share a stream, so none can move another's numbers."""
     opened = []
@@ -491,7 +506,7 @@ def only(*names: str) -> dict[str, str]:
     return {kind.name: "on" if kind.name in names else "off" for kind in DRAWS}
 
 
-@every(NoiseSource)
+@every_draw
 def test_switching_one_off_leaves_the_draws_of_the_others(kind, tmp_path):
     """Each draw is what it is alone, added to the mean, in every block of rows of a whole frame.
 
@@ -515,7 +530,7 @@ def test_gain_noise_keeps_its_draws_when_light_is_noisy(tmp_path):
     np.testing.assert_allclose(both / light, quiet, rtol=1e-12)
 
 
-@every(NoiseSource)
+@every_draw
 def test_each_seed_moves_its_own_draws_only(kind, tmp_path):
     """Fixed patterns stay with the sensor when the frame changes; the rest is new.
 
@@ -579,7 +594,9 @@ def test_finite_on_hostile_input(kind, dtype, tmp_path):
         results = [effect.transport(np.array([[-1e9, 0], [1e-30, 0.5], [1e6, 1e12]], dtype))]
     else:
         signal = np.array([[-1e9, -1.0, 0, 1e-30, 0.5, 7.9999, 8.0, 1e6, 1e12]], dtype)
-        if isinstance(effect, NoiseSource):
+        if isinstance(effect, PatternMaps):  # it knows the pixels of its array alone
+            results = [effect.apply(np.resize(signal, effect.shape), site(*effect.shape))]
+        elif isinstance(effect, NoiseSource):
             results = [drawn(effect, signal, site(1, 9, dtype=dtype))]
         else:
             results = [effect.apply(signal)]

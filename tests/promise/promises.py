@@ -6,6 +6,7 @@ Small arrays, since nothing here depends on their size but time and memory.
 from __future__ import annotations
 
 import math
+import shutil
 import statistics
 import time
 from collections.abc import Callable, Iterator
@@ -13,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from making import RINGS
 
 from vcam_cli import load, simulate
 from vcam_cli.accuracy_study import ablation
@@ -299,7 +301,12 @@ pixel:
     heavy_tailed_noise: {rms: 4 e, shape: -0.15}
     correlated_row_noise: {rms: 3 e, correlation: 0.8}
     telegraph_noise: {fraction: 3 %, amplitude: 30 e}
-  fpn: {dark: 20 %, offset_column: 5 e, gain_column: 0.2 %, shading: {offset: 4 e, gain: 1 %}}
+  fpn:
+    dark: 20 %
+    offset_column: 5 e
+    gain_column: 0.2 %
+    shading: {offset: 4 e, gain: 1 %}
+    offset_map: rings.npy
 array: {rows: 60, columns: 80}
 adc: {noise: 0.7 DN}
 exposure: {auto: {max: 100 ms}}
@@ -345,6 +352,7 @@ def picture_files(folder: Path) -> None:
     planes = (np.clip(field, 0, 1) * 65535).astype(np.uint16)
     write_png(folder / "color.png", np.ascontiguousarray(np.moveaxis(planes, 0, 2)))
     write_png(folder / "gray.png", planes[0])
+    shutil.copy(RINGS, folder / "rings.npy")
     for color, fall in (("red", 0.3), ("green", 0.02)):
         table = f"image_height_mm,value\n0,1\n0.1,{1 - fall / 2}\n1,{1 - fall}\n"
         (folder / f"{color}.csv").write_text(table, encoding="utf-8")

@@ -118,6 +118,7 @@ def tree(number: int) -> dict:
                 "offset_column": spread(0.1, 5, "e"),
                 "gain_pixel": spread(0.1, 2, "%"),
                 "shading": {"offset": spread(0.3, 5, "e"), "gain": spread(0.1, 2, "%")},
+                "offset_map": "rings.npy",
             },
         },
         "array": {

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from making import GONE, QUIET, camera, long_except, radiance_for
+from making import GONE, QUIET, RINGS, camera, long_except, radiance_for
 
 from vcam_cli import simulate
 from vcam_cli.effects.order import ORDER
@@ -70,7 +70,11 @@ CAMERAS = {
     | PATCHES
     | NOISE
     | LONG,
-    "no tolerance to speak of": {"accuracy": "reference"} | NOISE | WIDE | CSF | {DARK: "9 e/s"},
+    "no tolerance to speak of": {"accuracy": "reference"}
+    | NOISE
+    | WIDE
+    | CSF
+    | {DARK: "9 e/s", "pixel.fpn.offset_map": RINGS},
     "all traces": {
         "accuracy": "2 %",
         "scene.radiance": radiance_for(9.5e4),
@@ -98,7 +102,11 @@ CAMERAS = {
         "pixel.readout.correlated_row_noise": {"rms": "40 e"},
         "pixel.readout.telegraph_noise": {"fraction": "5 %", "amplitude": "90 e"},
         "adc.noise": "1 DN",
-        "pixel.fpn": {"dark": "20 %", "shading": {"offset": "20 e", "gain": "1 %"}},
+        "pixel.fpn": {
+            "dark": "20 %",
+            "shading": {"offset": "20 e", "gain": "1 %"},
+            "offset_map": RINGS,
+        },
         "pixel.defects": {"hot": 0.01, "hot_current": 200, "dead": 0.02},
         "pixel.crosstalk": {"optical": "0.5 %", "interpixel_capacitance": "0.4 %"},
         "pixel.blooming": "10 %",

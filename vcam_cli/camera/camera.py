@@ -27,7 +27,9 @@ from vcam_cli.floats import own_float_errors
 
 EXAMPLE = "starter"
 """The shipped camera whose sections stand in for those that a file has wrong."""
-FILE_KEYS = frozenset({"file", "positions", "mask", "image.depth"})
+FILE_KEYS = frozenset(
+    {"file", "positions", "mask", "image.depth", "offset_map", "gain_map", "dark_map"}
+)
 """Keys that hold names of data files."""
 
 _EXCLUSIVE = (

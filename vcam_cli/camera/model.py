@@ -113,6 +113,7 @@ class CameraModel(FileModel):
             *self._crosstalk_mistakes(),
             *self._phase_mistakes(),
             *self._blooming_mistakes(),
+            *self._map_mistakes(),
             *unmeasured_mistakes(
                 self.expect, self.quality, self.has_edge, self.exposure.has_samples
             ),
@@ -192,6 +193,19 @@ class CameraModel(FileModel):
             if refused:
                 message = f"is not simulated with {what}"
                 yield fault(("pixel", "blooming"), message, f"{remedy}, or blooming: 0 %")
+
+    def _map_mistakes(self) -> Iterator[InitErrorDetails]:
+        """Yield why pixels cannot have a fixed pattern from files."""
+        fpn, array = self.pixel.fpn, self.array
+        scattered = array.is_scattered or array.pattern == "stacked"
+        for name in ("offset_map", "gain_map", "dark_map"):
+            for refused, what, remedy in (
+                (scattered, "stacked or scattered pixels", "write another array.pattern"),
+                (array.reads_several, "binned pixels", "remove array.binning"),
+            ):
+                if getattr(fpn, name) is not None and refused:
+                    message = f"is not simulated with {what}"
+                    yield fault(("pixel", "fpn", name), message, f"{remedy}, or remove {name}")
 
     def _phase_mistakes(self) -> Iterator[InitErrorDetails]:
         """Yield why halves of the lens cannot be distinguished."""

@@ -37,6 +37,7 @@ EFFECTS = {
     "telegraph_noise": "random telegraph noise of trapping sites",
     "fpn": "offset and gain differences of pixels and columns",
     "fpn_shading": "low-frequency offset and gain differences over the array",
+    "fpn_maps": "offset, gain and dark current of every pixel, from files",
     "blooming": "charge beyond the full well that spills along columns",
     "saturation": "a pixel clips at its full-well capacity",
     "adc_noise": "noise of the ADC, behind the gain",

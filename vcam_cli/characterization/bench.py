@@ -50,6 +50,8 @@ FIELD = 512
 """Rows and columns of the field that is measured, cut down to whole blocks of colors."""
 EDGE_ANGLE, EDGE_CONTRAST = 5, 0.6
 """Angle [degree] and contrast of the slanted edge of ISO 12233: bright over dark 4 to 1."""
+FIXED = ("fpn", "fpn_shading", "fpn_maps", "charge_transfer")
+"""What a flat field removes, and charge that is lost on its way out: neither is in an edge."""
 LEVELS = ("luminance", "radiance", "illuminance", "irradiance")
 """Keys of a scene that give its light's level."""
 BENCH_LUMINANCE = 100.0
@@ -293,7 +295,7 @@ def prepare_edge_bench(bench: Bench, stages: Stages) -> Bench:
     """
     named = {"kind": "chart", "chart": "slanted-edge", "angle": f"{EDGE_ANGLE} deg"}
     chart = SlantedEdge.model_validate({**named, "contrast": EDGE_CONTRAST})
-    camera = _before_chart(bench.camera, chart, "off_axis", "fpn", "fpn_shading", "charge_transfer")
+    camera = _before_chart(bench.camera, chart, "off_axis", *FIXED)
     if camera.accuracy.tolerance > EDGE_TOLERANCE:
         finer = camera.accuracy.model_copy(update={"preset": None, "tolerance": EDGE_TOLERANCE})
         camera = camera.model_copy(update={"accuracy": finer})

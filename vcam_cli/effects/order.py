@@ -17,9 +17,10 @@
     electrons / s          NeighborSharing    crosstalk                      electrons / s
     electrons / s          Charge             dark_current                   electrons (mean signal)
     electrons              Transport          charge_transfer                electrons (mean signal)
-    electrons              before_shot        fpn                            electrons (mean signal)
+    electrons              before_shot        fpn, fpn_maps                  electrons (mean signal)
     electrons              NoiseSource        shot_noise, fpn, fpn_shading,  electrons
-                                              reset_noise, read_noise,
+                                              fpn_maps, reset_noise,
+                                              read_noise,
                                               heavy_tailed_noise,
                                               correlated_row_noise,
                                               telegraph_noise

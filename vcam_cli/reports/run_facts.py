@@ -17,7 +17,11 @@ UNITS = {
 
 def spoken(name: str) -> str:
     """Return the name of an effect as it is said."""
-    fixed = {"fpn": "fixed-pattern noise", "fpn_shading": "shading of the fixed pattern"}
+    fixed = {
+        "fpn": "fixed-pattern noise",
+        "fpn_shading": "shading of the fixed pattern",
+        "fpn_maps": "measured fixed pattern",
+    }
     return fixed.get(name, name.replace("_", " "))
 
 

@@ -23,6 +23,7 @@ from vcam_cli.camera.scene.scene_files import Crop
 from vcam_cli.camera.scene.sources import Layers
 from vcam_cli.camera.sensor.array import Positions
 from vcam_cli.effects import readout_chain
+from vcam_cli.effects.noise import fpn_maps
 from vcam_cli.effects.optics import aberration, point_spread
 from vcam_cli.errors import bad, split
 from vcam_cli.solve.effects import camera_effects
@@ -310,6 +311,53 @@ def read_lens(camera: Camera) -> dict[str, Array]:
     return {point_spread.PSF: read_psf(psf.file, channels, (*split(point_spread.PSF), "file"))}
 
 
+def check_maps(camera: Camera) -> None:
+    """Refuse unusable maps of the fixed pattern.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Raises
+    ------
+    BadInput
+        For such maps.
+    """
+    read_maps(camera)
+
+
+def read_maps(camera: Camera) -> dict[str, Array]:
+    """Return the maps of the fixed pattern, for `Camera.with_samples`.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera as its file describes it.
+
+    Returns
+    -------
+    dict of str to Array
+        Maps (rows, columns) by the dotted path of their key; empty without a file.
+
+    Raises
+    ------
+    BadInput
+        For a file that is no map, is smaller than the array, or has values that are not finite,
+        or negative gains or dark currents.
+    """
+    fpn = camera.pixel.fpn
+    files = dict(zip(fpn_maps.MAPS, (fpn.offset_map, fpn.gain_map, fpn.dark_map), strict=True))
+    found = {}
+    for key, file in files.items():
+        if file is not None:
+            from vcam_cli.files.images.scene_maps import read_pixels
+
+            g = geometry(camera)
+            found[key] = read_pixels(file, split(key), (g.rows, g.columns), key != fpn_maps.OFFSET)
+    return found
+
+
 def check_display(camera: Camera) -> None:
     """Refuse a display too fine to be judged, where a metric uses it.
 
@@ -401,6 +449,7 @@ CHECKS: tuple[files.CameraCheck, ...] = (
     (check_picture, "scene"),
     (check_depth, "scene optics pixel array"),
     (check_spectral_file, "scene optics pixel array exposure adc accuracy"),
+    (check_maps, "pixel array"),
     (check_lens, "optics scene pixel array effects"),
     (readout_chain.check, "scene optics pixel array adc exposure"),
     (check_files, "pixel array exposure adc output"),

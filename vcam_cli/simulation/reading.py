@@ -10,7 +10,7 @@ from vcam_cli.progress import Stages
 from vcam_cli.scenes.depth_scene import DepthPicture
 from vcam_cli.scenes.hyperspectral import Cube
 from vcam_cli.simulation import scene_bands
-from vcam_cli.simulation.checks import read_lens
+from vcam_cli.simulation.checks import read_lens, read_maps
 from vcam_cli.simulation.scene_files import read_scene
 from vcam_cli.simulation.shared import Shared
 from vcam_cli.solve.solved import Solved, solve
@@ -41,7 +41,7 @@ def read_camera(
     """
     camera = with_flat_scene(camera)  # one layer alone is flat
     with stages("read"):
-        samples = read_lens(camera)
+        samples = read_lens(camera) | read_maps(camera)
     if samples:
         camera = camera.with_samples(samples)
     found = shared.picture(camera, lambda: read_scene(camera, stages))

@@ -157,7 +157,7 @@ RULES = (
         "a single exposure needs none; give captures",
     ),
     Rule(
-        ("pixel.fpn.dark", f"{_DETECTOR}.dark_current_scale"),
+        ("pixel.fpn.dark", "pixel.fpn.dark_map", f"{_DETECTOR}.dark_current_scale"),
         lambda camera: dark_rate(camera) == 0,
         f"there is no dark current; give {_DETECTOR}.dark_current",
     ),

@@ -27,6 +27,7 @@ from vcam_cli.config.validation_messages import fault, refusal
 from vcam_cli.config.values import (
     MOST_ELECTRONS,
     Electrons,
+    FileName,
     Fraction,
     MaybeFraction,
     MaybeTime,
@@ -217,6 +218,12 @@ class Readout(Model):
         return self
 
 
+_MAP = (
+    "in addition to the drawn pattern; an image or NPY file of one channel, as large as the array"
+    " or larger, of which the center is taken"
+)
+
+
 class FixedPattern(Model):
     """Fixed-pattern noise of pixels and columns, equal in every frame."""
 
@@ -242,6 +249,21 @@ class FixedPattern(Model):
     shading: Annotated[PatternShading | None, word_or(PatternShading, {"none": None})] = key(
         "low-frequency offset and gain differences over the array",
         example={"offset": "2 e", "gain": "0.5 %"},
+        default=None,
+    )
+    offset_map: Annotated[str | None, FileName()] = key(
+        f"file with the offset of every pixel in e, less the mean over the array; {_MAP}",
+        example="offset.exr",
+        default=None,
+    )
+    gain_map: Annotated[str | None, FileName()] = key(
+        f"file with the gain of every pixel in any unit, over the mean; {_MAP}",
+        example="gain.exr",
+        default=None,
+    )
+    dark_map: Annotated[str | None, FileName()] = key(
+        f"file with the dark current of every pixel in any unit, over the mean; {_MAP}",
+        example="dark.exr",
         default=None,
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from vcam_cli.effects.noise.correlated_row_noise import CorrelatedRowNoise
 from vcam_cli.effects.noise.fpn import FixedPattern
+from vcam_cli.effects.noise.fpn_maps import PatternMaps
 from vcam_cli.effects.noise.fpn_shading import PatternShading
 from vcam_cli.effects.noise.heavy_tailed_noise import HeavyTailedNoise
 from vcam_cli.effects.noise.read_noise import ReadNoise
@@ -16,6 +17,7 @@ SOURCES: tuple[type[NoiseSource], ...] = (
     ShotNoise,
     FixedPattern,
     PatternShading,
+    PatternMaps,
     ResetNoise,
     ReadNoise,
     HeavyTailedNoise,

@@ -1,5 +1,7 @@
 """Maps beside a scene's picture: how opaque, and how far away it is at every sample."""
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +19,8 @@ from vcam_cli.files.images.images import (
 )
 
 YamlPath = tuple[str | int, ...]
+LARGEST = 1e9
+"""Of the values of a map of pixels: more electrons than any well holds."""
 
 
 def read_opacity(path: Path | str, yaml_path: YamlPath) -> Array:
@@ -84,7 +88,11 @@ def read_depth(
     remedy = "save it as an .exr with one channel of distances in m"
     with convert_errors(path, yaml_path, remedy):
         check_file(path)
-        stored = _numpy_map(path) if path.suffix.lower() == ".npy" else _image_map(path, channel)
+        stored = (
+            _numpy_map(path)
+            if path.suffix.lower() == ".npy"
+            else _image_map(path, partial(_depth_channel, wanted=channel))
+        )
         if stored.shape != size:
             raise UnusableFile(
                 f"has {stored.shape[0]} x {stored.shape[1]} distances for a picture of {size[0]} x"
@@ -108,6 +116,59 @@ def read_depth(
     return depth, tuple(notes)
 
 
+def read_pixels(
+    path: Path | str, yaml_path: YamlPath, least: tuple[int, int], positive: bool
+) -> Array:
+    """Return one number for every pixel (h, w) from an image or NPY file of one channel.
+
+    Parameters
+    ----------
+    path : Path or str
+        An image with one channel, or a .npy of rows x columns; its values as they are stored.
+    yaml_path : tuple
+        Key that names the file.
+    least : tuple of int
+        Rows and columns that it has at least.
+    positive : bool
+        Whether negative values, and a mean of 0, are refused.
+
+    Raises
+    ------
+    BadInput
+        For a file that is no such map, is smaller, or has a value that is not allowed.
+    """
+    path = Path(path)
+    with convert_errors(path, yaml_path, "save it as an .exr with one channel, or as .npy"):
+        check_file(path)
+        stored = _numpy_map(path) if path.suffix.lower() == ".npy" else _image_map(path, _only)
+        if any(have < want for have, want in zip(stored.shape, least, strict=True)):
+            raise UnusableFile(
+                f"has {stored.shape[0]} x {stored.shape[1]} values for an array of {least[0]} x"
+                f" {least[1]} pixels",
+                "give one value for every pixel",
+            )
+        found = np.asarray(stored, np.float32)
+        wrong = ~np.isfinite(found) | (np.abs(found) > LARGEST) | (positive & (found < 0))
+        if wrong.any():
+            row, column = np.argwhere(wrong)[0]
+            kind = f"numbers from 0 to {LARGEST:g}" if positive else f"within +-{LARGEST:g}"
+            raise UnusableFile(
+                f"holds {stored[row, column]:g} at row {row}, column {column}, one of {wrong.sum()}"
+                f" values that are not {kind}",
+                "replace them, for example by the mean",
+            )
+        if positive and not found.any():
+            raise UnusableFile("is 0 everywhere", "give values relative to a mean above 0")
+    return found
+
+
+def _only(names: tuple[str, ...]) -> int:
+    """Return the index of the only channel."""
+    if len(names) != 1:
+        raise UnusableFile(f"has {len(names)} channels", "save it with one channel")
+    return 0
+
+
 def _numpy_map(path: Path) -> Array:
     found = np.load(path, mmap_mode="r", allow_pickle=False)
     if not isinstance(found, np.ndarray) or found.ndim != 2 or found.dtype.kind not in "fui":
@@ -115,12 +176,12 @@ def _numpy_map(path: Path) -> Array:
     return found
 
 
-def _image_map(path: Path, channel: str | None) -> Array:
+def _image_map(path: Path, choose: Callable[[tuple[str, ...]], int]) -> Array:
     with open_image(path) as source:
         spec = source.spec()
         if spec.deep or spec.depth > 1:
             raise UnusableFile("is a deep image or a volume")
-        index = _depth_channel(tuple(spec.channelnames), channel)
+        index = choose(tuple(spec.channelnames))
         check_size(spec, 1)
         bits = spec.get_int_attribute("oiio:BitsPerSample", 8)
         if bits not in (8, 16, 32, 64):
