@@ -13,6 +13,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.sensor.array import Binning
 from vcam_cli.effects.base import Effect, SignalLevels, of_kind
+from vcam_cli.physics import noise
 from vcam_cli.rng import coarse_normals
 
 SIGMAS = 6.0
@@ -81,6 +82,55 @@ class Site:
         if self.coarse_normals:
             return coarse_normals(self.stream(name), self.rows, self.columns, self.dtype)
         return self.stream(name).standard_normal((self.rows, self.columns), dtype=self.dtype)
+
+    def poisson(self, name: str, mean: Array) -> Array:
+        """Return Poisson numbers.
+
+        Parameters
+        ----------
+        name : str
+            Name of the stream.
+        mean : Array
+            Means (rows, columns); they may be reused [electrons].
+
+        Returns
+        -------
+        Array
+            Whole numbers (rows, columns) [electrons].
+        """
+        return noise.poisson_from_normal(mean, self.normal(name))
+
+    def uniform(self, name: str) -> Array:
+        """Return one number between 0 and 1 a pixel (rows, columns), in 64 bits.
+
+        So they are the same whatever the rest is computed in.
+        """
+        return self.stream(name).random((self.rows, self.columns))
+
+    def sensor_uniform(self, name: str) -> Array:
+        """Return the same of a stream that stays with the sensor."""
+        return self.sensor_stream(name).random((self.rows, self.columns))
+
+    def exponential(self, name: str) -> Array:
+        """Return one standard exponential number a pixel (rows, columns), in 64 bits."""
+        return self.stream(name).standard_exponential((self.rows, self.columns))
+
+    def sensor_map(self, name: str, make: Callable[[Site], Array]) -> Array:
+        """Return a map (rows, columns) that stays with the sensor, as `make` computes it here.
+
+        Parameters
+        ----------
+        name : str
+            Name of the map.
+        make : callable
+            Function of a site.
+        """
+        return make(self)
+
+    @property
+    def has_dark(self) -> bool:
+        """Whether there is any dark signal."""
+        return self.dark > 0
 
     def normal_columns(self, name: str) -> Array:
         """Return one standard normal number a column, the same for every block.

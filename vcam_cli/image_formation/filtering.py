@@ -10,7 +10,7 @@ share.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -77,6 +77,34 @@ class Series:
 
 
 @dataclass(frozen=True)
+class _Ones:
+    """The spectrum of a plane whose coefficients are all 1: filtered, it is the filter."""
+
+    columns: int
+    dtype = np.dtype(np.float64)
+
+    def __len__(self) -> int:
+        return 1
+
+    def rows(self, plane: int, index: Array | slice, count: int | None = None) -> Array:
+        """Return ones (n, count)."""
+        width = self.columns if count is None else min(count, self.columns)
+        return np.ones((self.count_of(index), width))
+
+    @staticmethod
+    def count_of(index: Array | slice) -> int:
+        """Return how many rows an index has, as `_consecutive` makes it."""
+        if not isinstance(index, slice):
+            return len(index)
+        stop = -1 if index.stop is None else index.stop
+        return int((stop - index.start) // index.step)
+
+    def products(self, y: Array, x: Array, workers: int) -> Array:
+        """Return nothing: a filter does not ask."""
+        return np.zeros((1, len(y) - 1, len(x) - 1))
+
+
+@dataclass(frozen=True)
 class Filter:
     """A transfer function acting on the cosine series of a scene."""
 
@@ -120,6 +148,45 @@ class Filter:
     def terms(self) -> int:
         """Number of terms of a plane's spectrum that are filtered."""
         return int(self._counts(self.y.frequencies).sum())
+
+    def factors(self) -> Iterator[tuple[int, int, Array, Array]]:
+        """Yield what `apply` multiplies terms with, for filters without sines.
+
+        Yields
+        ------
+        mixture, color : int
+            Numbers of both.
+        terms : Array
+            Consecutive terms along y (n,).
+        factors : Array
+            Factors (n, terms along x, those that are 0 left out) on the DCT-II coefficients behind
+            the terms, with their signs and what folding along y makes of them [e/s].
+
+        Raises
+        ------
+        ValueError
+            Where a wave becomes another one: `is_even` tells.
+        """
+        if not self.is_even:
+            raise ValueError("a filter that turns cosines into sines is no single factor")
+        parts = self.tables.radial, self.tables.planes[0]
+        ones = _Ones(self.x.samples)
+        for mixture in range(self.tables.shape[0]):
+            radial, plane = (None if p is None else p[mixture : mixture + 1] for p in parts)
+            mix = self.tables.mix[mixture : mixture + 1]
+            alone = replace(self.tables, mix=mix, radial=radial, planes=(plane, None, None, None))
+            table = reader(alone, 0, self.x.frequencies)
+            one = replace(self, tables=alone)
+            for rows in pieces(self.y.folded_terms, LONGEST):
+                for _, terms, weights in self.y.folding(rows):
+                    for part, color, light in one._filter_rows(ones, table, terms, weights):
+                        yield mixture, color, terms[part], light
+
+    @property
+    def is_even(self) -> bool:
+        """Whether cosines stay cosines, and pixels see them where a transform evaluates them."""
+        found = self.x.virtual_pixels and self.y.virtual_pixels
+        return bool(found) and not (self.x.shift or self.y.shift) and self.tables.parities == [0]
 
     def _multiply(
         self, spectrum: SceneSpectrum, parity: int, folded: dict[Waves, Array], workers: int

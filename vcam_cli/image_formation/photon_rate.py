@@ -223,19 +223,62 @@ def _spread(rate: Array, mosaic: Mosaic, glare: VeilingGlare) -> None:
         for plane in rate:
             plane += glare.fraction * (plane.mean(dtype=np.float64) - plane)
         return
-    light = rate[0]
+    spread_over_mosaic(rate[0], mosaic, glare)
+
+
+def spread_over_mosaic(light: Array, mosaic: Mosaic, glare: VeilingGlare) -> None:
+    """Lay the glare's share of the light evenly over the pixels of its color, in place.
+
+    Parameters
+    ----------
+    light : Array
+        Light of a mosaic (..., rows, columns), of NumPy or of a device, in any unit.
+    mosaic : Mosaic
+        Colors of the pixels.
+    glare : VeilingGlare
+        The glare.
+    """
     period = len(mosaic.block)
-    sums, counts = np.zeros(len(mosaic.colors)), np.zeros(len(mosaic.colors))
     sites = [
         (row, color, columns)
         for row in range(period)
         for color, places in mosaic.row_colors(row)
         for columns in places
     ]
+    sums: dict[int, Any] = dict.fromkeys(range(len(mosaic.colors)), 0.0)
+    counts = [0] * len(mosaic.colors)
     for row, color, columns in sites:
-        here = light[row::period, columns]
-        sums[color] += here.sum(dtype=np.float64)
-        counts[color] += here.size
+        here = light[..., row::period, columns]
+        sums[color] = sums[color] + here.sum(axis=(-2, -1), dtype=np.float64)
+        counts[color] += math.prod(here.shape[-2:])
     light *= light.dtype.type(1 - glare.fraction)
     for row, color, columns in sites:
-        light[row::period, columns] += glare.fraction * sums[color] / max(counts[color], 1)
+        even = glare.fraction * sums[color] / max(counts[color], 1)
+        light[..., row::period, columns] += even[..., None, None]
+
+
+def gain_maps(path: OpticalPath, dtype: type) -> list[Array | VeilingGlare]:
+    """Return what acts on the light at the photodetectors, in its order.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    dtype : type
+        Floating-point type.
+
+    Returns
+    -------
+    list
+        Products of gains (rows, columns), relative to the axis, and glares between them.
+    """
+    x, y = (axis.astype(dtype) for axis in pixel_centers(path.geometry))
+    glares, gains = _glares_and_gains(path.effects)
+    found: list[Array | VeilingGlare] = []
+    for number, group in enumerate(gains):
+        if number:
+            found.append(glares[number - 1])
+        if group:
+            maps = (e.gain(x, y) / (e.on_axis or 1.0) for e in group)
+            found.append(np.prod(np.broadcast_arrays(*maps), axis=0).astype(dtype))
+    return found

@@ -22,6 +22,7 @@ from vcam_cli import memory
 from vcam_cli.arrays import Array
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.blurs import Blur, FieldTransfer, SeparableTransfer
+from vcam_cli.effects.warps import Warp
 from vcam_cli.image_formation.box_average import box_averages, point_values
 from vcam_cli.image_formation.estimates import memory_model
 from vcam_cli.image_formation.estimates.bandwidth import (
@@ -58,6 +59,7 @@ from vcam_cli.image_formation.sub_exposures import sub_exposed_layers, sub_expos
 from vcam_cli.image_formation.transfer_tables import Tables, mixtures, tabulate
 from vcam_cli.scenes.base import ChartScene, HarmonicScene, SampledScene
 from vcam_cli.scenes.depth_scene import DepthScene
+from vcam_cli.scenes.image import ImageScene
 from vcam_cli.scenes.layered import AnyScene, LayeredScene
 from vcam_cli.scenes.waves import WaveScene
 
@@ -220,6 +222,37 @@ def _spectral_layers(
     )
     layers = filtered_layers(image_filter, modes, image.spectrum, path.workers)
     return chain(layers, far.layers(modes, followed)), report
+
+
+def picture_filter(path: OpticalPath, scene: AnyScene) -> tuple[Filter, type] | None:
+    """Return the one filter that brings all pictures of a size to the pixels, and its float type.
+
+    It follows the spectrum as far as lens and pixels pass it, whatever the picture holds.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    scene : AnyScene
+        Any picture of that size.
+
+    Returns
+    -------
+    tuple or None
+        Filter and type; None where a picture's light takes more than one filter.
+    """
+    if not isinstance(scene, ImageScene) or path.transfer.is_dark or path.layers or path.field:
+        return None
+    if of_kind(path.effects, Warp) or path.is_displaced:
+        return None
+    if not path.transfer.effects and path.averages_over_box:
+        return None
+    highest = highest_passed(path, scene)
+    size = table_size(path, highest)
+    tables = tabulate(path.transfer, size, mixtures(path.transfer, size))
+    found = _filter(path, scene, tables, highest)
+    dtype = with_sufficient_precision(path, scene).settings.dtype
+    return (found, dtype) if found.is_even else None
 
 
 def _filter(path: OpticalPath, scene: SampledScene, tables: Tables, highest: float) -> Filter:

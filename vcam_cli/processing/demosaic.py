@@ -59,23 +59,23 @@ def bilinear_rows(mosaic: np.ndarray, pattern: Pattern, colors: tuple[str, ...])
     ndarray
         Planes (C, rows, columns), float32.
     """
-    wide = np.concatenate((mosaic[:, 1:2], mosaic, mosaic[:, -2:-1]), axis=1)
-    center = mosaic[1:-1]
-    vertical = wide[:-2] + wide[2:]
-    horizontal = wide[1:-1, :-2] + wide[1:-1, 2:]
-    diagonal = vertical[:, :-2] + vertical[:, 2:]
+    wide = np.concatenate((mosaic[..., 1:2], mosaic, mosaic[..., -2:-1]), axis=-1)
+    center = mosaic[..., 1:-1, :]
+    vertical = wide[..., :-2, :] + wide[..., 2:, :]
+    horizontal = wide[..., 1:-1, :-2] + wide[..., 1:-1, 2:]
+    diagonal = vertical[..., :-2] + vertical[..., 2:]
     diagonal *= np.float32(0.25)
-    vertical = vertical[:, 1:-1]
+    vertical = vertical[..., 1:-1]
     cross = vertical + horizontal
     cross *= np.float32(0.25)
     vertical *= np.float32(0.5)
     horizontal *= np.float32(0.5)
 
-    planes = np.empty((len(colors), *center.shape), np.float32)
+    planes: np.ndarray = np.empty_like(center, np.float32, shape=(len(colors), *center.shape))
     plane = dict(zip(colors, planes, strict=True))
     green = pattern[0][0] if pattern[0][0] == pattern[1][1] else pattern[0][1]
     for i, j in ((0, 0), (0, 1), (1, 0), (1, 1)):
-        site = (slice(i, None, 2), slice(j, None, 2))
+        site = (..., slice(i, None, 2), slice(j, None, 2))
         plane[pattern[i][j]][site] = center[site]
         if pattern[i][j] == green:
             plane[pattern[i][1 - j]][site] = horizontal[site]

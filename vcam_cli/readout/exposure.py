@@ -6,9 +6,10 @@ draw has its own stream per block, so the frame does not depend on the number of
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.pixel_signal import Charge
 from vcam_cli.effects.signal_chain import (
+    ElectronEffect,
     NoiseSource,
     Quantizer,
     Site,
@@ -24,21 +26,22 @@ from vcam_cli.effects.signal_chain import (
 from vcam_cli.parallel import each, slices_within
 from vcam_cli.rng import BLOCK_ROWS, blocks, stream
 
+Time = TypeVar("Time", float, Array)
 AT_ONCE = 1 << 16
 """Pixels that flow together, about: a draw is made for them in the same order as for more."""
 LAYER = 32
 """Bits of a block's number: those above are the layer's of stacked pixels."""
 
 
-def mean_electrons(rate: Array, time: float, effects: tuple[Effect, ...]) -> Array:
+def mean_electrons(rate: Array, time: Time, effects: tuple[Effect, ...]) -> Array:
     """Return the noise-free signal before saturation, photo-electrons and dark current.
 
     Parameters
     ----------
     rate : Array
         Photo-electrons per second, of any shape [e/s].
-    time : float
-        Exposure time [s].
+    time : float or Array
+        Exposure time, or those of frames (B, 1, 1) in the float type of `rate` [s].
     effects : tuple of Effect
         Effects of the camera, of which the charges count.
 
@@ -47,27 +50,30 @@ def mean_electrons(rate: Array, time: float, effects: tuple[Effect, ...]) -> Arr
     Array
         Mean signal in the shape and float type of `rate` [electrons].
     """
-    signal: Array = rate * rate.dtype.type(time) + rate.dtype.type(mean_dark(time, effects))
+    dark: float | Array = mean_dark(time, effects)
+    if getattr(time, "ndim", 0) == 0:
+        time, dark = rate.dtype.type(time), rate.dtype.type(dark)
+    signal: Array = rate * time + dark
     return signal
 
 
-def mean_dark(time: float, effects: tuple[Effect, ...]) -> float:
+def mean_dark(time: Time, effects: tuple[Effect, ...]) -> Time:
     """Return the mean dark signal of a pixel.
 
     Parameters
     ----------
-    time : float
-        Exposure time [s].
+    time : float or Array
+        Exposure time, or those of frames [s].
     effects : tuple of Effect
         Effects of the camera, of which the charges count.
 
     Returns
     -------
-    float
-        Mean dark signal [electrons].
+    float or Array
+        Mean dark signal, one for each time [electrons].
     """
     charges = of_kind(effects, Charge)
-    return time * sum(charge.rate() for charge in charges)
+    return time * float(sum(charge.rate() for charge in charges))
 
 
 def sites(
@@ -241,17 +247,14 @@ def capture(
         for rows in slices_within(block, max(1, AT_ONCE // rate.shape[1])):
             here = _at_rows(opened, rows)
             if settled is None:
-                tile = _mean_charge(rate[rows], time, effects, here)
+                tile = mean_charge(rate[rows], time, effects, here)
             else:
                 tile = settled[rows]
-            for effect in in_front:
-                tile = effect.apply(tile, here[effect.scope])
-            if full_charge is not None:
-                np.minimum(tile, full_charge[rows], out=tile)
+            tile = in_wells(
+                tile, in_front, here, None if full_charge is None else full_charge[rows]
+            )
             electrons[rows] = tile
-            for effect in electron_effects(effects, behind_well=True):
-                tile = effect.apply(tile, here[effect.scope])
-            dn[rows] = adc.apply(tile if pedestal is None else tile + pedestal[rows])
+            dn[rows] = codes(tile, effects, adc, here, None if pedestal is None else pedestal[rows])
         if done is not None:
             done(block)
 
@@ -259,20 +262,100 @@ def capture(
     return electrons, dn
 
 
-def _at_rows(opened: Mapping[str, Site], rows: slice) -> dict[str, Site]:
-    """Return the sites of a block for some of its rows."""
-    place = {"rows": rows.stop - rows.start, "first_row": rows.start}
-    return {scope: replace(site, **place) for scope, site in opened.items()}
-
-
-def _mean_charge(
-    rate: Array, time: float, effects: tuple[Effect, ...], here: Mapping[str, Site]
+def in_wells(
+    mean: Array,
+    effects: Sequence[ElectronEffect],
+    here: Mapping[str, Site],
+    full_charge: Array | None = None,
 ) -> Array:
-    """Return the mean signal whose shot noise is drawn, of some rows [electrons]."""
+    """Return the noisy signal that pixels hold, clipped above at the full well.
+
+    Parameters
+    ----------
+    mean : Array
+        Mean signal (..., rows, columns); it may be reused [electrons].
+    effects : sequence of ElectronEffect
+        Effects up to the well, in the order of action.
+    here : mapping
+        Site of each scope.
+    full_charge : Array, optional
+        As that of `capture` [electrons].
+
+    Returns
+    -------
+    Array
+        Signal in the shape of the mean [electrons].
+    """
+    for effect in effects:
+        mean = effect.apply(mean, here[effect.scope])
+    if full_charge is not None:
+        np.minimum(mean, full_charge, out=mean)
+    return mean
+
+
+def codes(
+    electrons: Array,
+    effects: Iterable[Effect],
+    adc: Quantizer,
+    here: Mapping[str, Site],
+    pedestal: Array | None = None,
+) -> Array:
+    """Return the codes of what pixels hold, with the noise behind the well.
+
+    Parameters
+    ----------
+    electrons : Array
+        Signal (..., rows, columns); it may be reused [electrons].
+    effects : iterable of Effect
+        Effects, of which those on electrons behind the well count.
+    adc : Quantizer
+        The ADC.
+    here : mapping
+        Site of each scope.
+    pedestal : Array, optional
+        As that of `capture` [electrons].
+
+    Returns
+    -------
+    Array
+        Whole codes in the shape and float type of the signal [DN].
+    """
+    for effect in electron_effects(effects, behind_well=True):
+        electrons = effect.apply(electrons, here[effect.scope])
+    return adc.apply(electrons if pedestal is None else electrons + pedestal)
+
+
+def mean_charge(
+    rate: Array, time: Time, effects: tuple[Effect, ...], here: Mapping[str, Site]
+) -> Array:
+    """Return the mean signal whose shot noise is drawn.
+
+    Parameters
+    ----------
+    rate : Array
+        Photo-electrons per second (..., rows, columns) [e/s].
+    time : float or Array
+        Exposure time, or those of frames (B, 1, 1) [s].
+    effects : tuple of Effect
+        Effects that run, in the order of action.
+    here : mapping
+        Site of each scope.
+
+    Returns
+    -------
+    Array
+        Mean signal in the shape and float type of the rate [electrons].
+    """
     tile = mean_electrons(rate, time, effects)
     for source in of_kind(effects, NoiseSource):
         tile = source.before_shot(tile, here[source.scope])
     return tile
+
+
+def _at_rows(opened: Mapping[str, Site], rows: slice) -> dict[str, Site]:
+    """Return the sites of a block for some of its rows."""
+    place = {"rows": rows.stop - rows.start, "first_row": rows.start}
+    return {scope: replace(site, **place) for scope, site in opened.items()}
 
 
 def _charges(
@@ -292,7 +375,7 @@ def _charges(
         opened = sites(rate, dark, seeds, layer, block, coarse_normals=coarse_normals)
         for rows in slices_within(block, max(1, AT_ONCE // rate.shape[1])):
             here = _at_rows(opened, rows)
-            tile = _mean_charge(rate[rows], time, effects, here)
+            tile = mean_charge(rate[rows], time, effects, here)
             for effect in in_charge:
                 tile = effect.apply(tile, here[effect.scope])
             out[rows] = tile

@@ -9,6 +9,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.camera.derived.electrical import Electrical
 from vcam_cli.camera.scene.sources import Layers
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.pixel_signal import Gain
@@ -22,6 +23,7 @@ from vcam_cli.readout import (
     nondestructive_samples,
     several_readouts,
 )
+from vcam_cli.readout.layout import Layout
 from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.layered import LayeredScene
 from vcam_cli.simulation.preparation import Prepared
@@ -213,16 +215,29 @@ class Frame(Prepared):
         return self.chain.to_dn(photo + dark)
 
 
-def _pedestal(ready: Prepared) -> Array | None:
-    """Return what black levels by color add to each pixel [electrons]; None without them."""
-    steps = dict(ready.electrical.black_steps)
+def pedestal(electrical: Electrical, layout: Layout, dtype: np.dtype | type) -> Array | None:
+    """Return what black levels by color add to each pixel.
+
+    Parameters
+    ----------
+    electrical : Electrical
+        The circuit.
+    layout : Layout
+        Where the pixels are.
+    dtype : dtype
+        Floating-point type.
+
+    Returns
+    -------
+    Array or None
+        Signal (rows, columns) [electrons]; None where all colors have one black level.
+    """
+    steps = dict(electrical.black_steps)
     if not steps:
         return None
-    listed = np.array([steps[color] for color in ready.mosaic.colors], ready.rate.dtype)
-    pedestal: Array = listed[ready.layout.color] * ready.rate.dtype.type(
-        ready.electrical.electrons_per_dn
-    )
-    return pedestal
+    listed = np.array([steps[color] for color in layout.raw_mosaic.colors], dtype)
+    found: Array = listed[layout.color] * listed.dtype.type(electrical.electrons_per_dn)
+    return found
 
 
 def _phase_codes(
@@ -283,7 +298,7 @@ def take_frame(ready: Prepared, workers: int, stages: Stages | None = None) -> F
                 seeds=seeds,
                 workers=workers,
                 coarse_normals=coarse,
-                pedestal=_pedestal(ready),
+                pedestal=pedestal(ready.electrical, ready.layout, ready.rate.dtype),
             )
             groups, time = ready.layout.binning_groups, ready.exposure_time
             electrons, dn = binned_readout.read(

@@ -132,25 +132,24 @@ class FixedPattern(NoiseSource):
 
     def before_shot(self, mean: Array, site: Site) -> Array:
         """Return the mean signal with dark currents and defects in it; it reuses the array."""
-        if self.dark and site.dark:
+        if self.dark and site.has_dark:
             z = site.normal("fpn dark")
             z *= self.dark
             np.maximum(z, -1, out=z)
-            z *= site.dark
-            mean += z
+            mean += z * site.dark
         if self.hot or self.dead:
             # 64 bits whatever the rest is computed in: the same pixels in both.
-            chance = site.stream("fpn defects").random((site.rows, site.columns))
+            chance = site.uniform("fpn defects")
             if self.hot_current:
-                leak = site.stream("fpn hot").standard_exponential(chance.shape)
+                leak = site.exponential("fpn hot")
                 mean += np.where(chance < self.hot, self.hot_current * site.dark * leak, 0)
             else:
-                mean[chance < self.hot] = OVERFULL * self.full_well
-            mean[chance >= 1 - self.dead] = 0
+                np.copyto(mean, float(OVERFULL * self.full_well), where=chance < self.hot)
+            np.copyto(mean, 0.0, where=chance >= 1 - self.dead)
         if self.bad_columns:
-            mean[:, site.uniform_columns("fpn bad columns") < self.bad_columns] = 0
+            np.copyto(mean, 0.0, where=site.uniform_columns("fpn bad columns") < self.bad_columns)
         if self.bad_rows:
-            mean[site.uniform_rows("fpn bad rows")[:, 0] < self.bad_rows] = 0
+            np.copyto(mean, 0.0, where=site.uniform_rows("fpn bad rows") < self.bad_rows)
         return mean
 
     def apply(self, electrons: Array, site: Site) -> Array:

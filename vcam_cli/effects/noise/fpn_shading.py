@@ -61,12 +61,21 @@ class PatternShading(NoiseSource):
 
     def apply(self, electrons: Array, site: Site) -> Array:
         """Return the block with gains and offsets in it; it reuses the array [electrons]."""
-        offsets, gains = self._strengths(site)
+        offsets, gains = site.sensor_map(self.name, self._maps)
         if self.gain:
-            electrons *= 1 + self.gain * _cosines(gains, site).astype(electrons.dtype)
+            electrons *= 1 + gains
         if self.offset:
-            electrons += self.offset * _cosines(offsets, site).astype(electrons.dtype)
+            electrons += offsets
         return electrons
+
+    def _maps(self, site: Site) -> Array:
+        """Return offsets and gains of a block (2, rows, columns); 0 where there are none."""
+        maps = np.zeros((2, site.rows, site.columns), site.dtype)
+        strengths = zip((self.offset, self.gain), self._strengths(site), maps, strict=True)
+        for rms, waves, target in strengths:
+            if rms:
+                target += rms * _cosines(waves, site).astype(site.dtype)
+        return maps
 
     def _strengths(self, site: Site) -> tuple[Array, Array]:
         """Return the strengths of the cosines, (along y, along x), for offsets and for gains."""

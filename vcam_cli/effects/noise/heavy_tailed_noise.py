@@ -114,7 +114,7 @@ class HeavyTailedNoise(NoiseSource):
     def apply(self, electrons: Array, site: Site) -> Array:
         """Return the block with the noise of one readout in it; it reuses the array [electrons]."""
         # 64 bits whatever the rest is computed in: tails end where the generator's steps begin.
-        chance = site.stream(self.name).random((site.rows, site.columns))
+        chance = site.uniform(self.name)
         z = tukey_lambda(np.maximum(chance, LEAST_CHANCE), self.shape)
         z *= self.rms / tukey_lambda_spread(self.shape)
         electrons += z.astype(electrons.dtype)

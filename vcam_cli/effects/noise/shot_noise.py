@@ -51,10 +51,9 @@ class ShotNoise(NoiseSource):
 
     def apply(self, electrons: Array, site: Site) -> Array:
         """Return Poisson numbers of the block's means [electrons]."""
-        z = site.normal(self.name)
         if self.model == "gaussian":
-            return noise.gaussian_shot_noise(electrons, z)
-        return noise.poisson_from_normal(electrons, z)
+            return noise.gaussian_shot_noise(electrons, site.normal(self.name))
+        return site.poisson(self.name, electrons)
 
     def variance(self, mean: float, dark: float = 0.0) -> float:
         """Return the variance of a Poisson number, its mean [electrons squared].

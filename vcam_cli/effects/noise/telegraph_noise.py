@@ -69,24 +69,19 @@ class TelegraphNoise(NoiseSource):
 
     def apply(self, electrons: Array, site: Site) -> Array:
         """Return the block with the state of its traps in it; it reuses the array [electrons]."""
-        shape = (site.rows, site.columns)
         # 64 bits whatever the rest is computed in: the same pixels in both.
-        chance = site.sensor_stream(f"{self.name} trap").random(shape)
-        level = self._filled(site, self.name, shape)
-        level -= (
-            self._filled(site, f"{self.name} reset", shape)
-            if self.double_sampled
-            else (self.occupancy)
-        )
+        chance = site.sensor_uniform(f"{self.name} trap")
+        level = self._filled(site, self.name)
+        level -= self._filled(site, f"{self.name} reset") if self.double_sampled else self.occupancy
         trapped = chance < self.fraction
         # Of pixels with a trap, chance / fraction is even from 0 to 1, whatever the fraction is.
         step = -self.amplitude * np.log1p(-chance[trapped] / self.fraction)
-        electrons[trapped] += (step * level[trapped]).astype(electrons.dtype)
+        electrons[..., trapped] += (step * level[..., trapped]).astype(electrons.dtype)
         return electrons
 
-    def _filled(self, site: Site, name: str, shape: tuple[int, int]) -> NDArray[np.float64]:
+    def _filled(self, site: Site, name: str) -> NDArray[np.float64]:
         """Return 1 where a trap would be filled at this readout, 0 where empty."""
-        return (site.stream(name).random(shape) < self.occupancy).astype(np.float64)
+        return (site.uniform(name) < self.occupancy).astype(np.float64)
 
     def variance(self, mean: float, dark: float = 0.0) -> float:
         """Return the variance that it adds, in the mean over the pixels [electrons squared]."""

@@ -1,0 +1,118 @@
+"""A device that is none: NumPy's arrays that refuse hidden copies, as those of CuPy do.
+
+It refuses what CuPy refuses: conversion by `np.asarray`, mixing with arrays of NumPy, functions of
+NumPy that CuPy lacks, methods of ufuncs.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.lib.mixins import NDArrayOperatorsMixin
+
+from vcam_cli.backend import Processor
+
+FUNCTIONS = {
+    *("clip", "concatenate", "copyto", "empty_like", "moveaxis", "partition", "prod", "ravel"),
+    *("take", "where", "zeros_like", "mean", "ndim", "broadcast_arrays"),
+}
+"""Functions of NumPy that a device's arrays may meet: CuPy has all of them."""
+
+
+def _own(value: Any) -> Any:
+    if isinstance(value, FakeArray):
+        return value.values
+    if isinstance(value, tuple | list):
+        return type(value)(_own(item) for item in value)
+    if isinstance(value, np.ndarray) and value.ndim:
+        raise TypeError("Unsupported type <class 'numpy.ndarray'>")
+    return value
+
+
+def _fake(found: Any) -> Any:
+    if isinstance(found, np.ndarray | np.generic):
+        return FakeArray(np.asarray(found))
+    if isinstance(found, tuple | list):
+        return type(found)(_fake(item) for item in found)
+    return found
+
+
+class FakeArray(NDArrayOperatorsMixin):
+    def __init__(self, values: np.ndarray) -> None:
+        self.values = values
+
+    def __array__(self, *_: Any, **__: Any) -> np.ndarray:
+        raise TypeError("Implicit conversion to a NumPy array is not allowed")
+
+    def __array_ufunc__(self, ufunc, method, *inputs, **kwargs):
+        if method != "__call__":
+            return NotImplemented
+        if "out" in kwargs:
+            [out] = kwargs["out"]
+            ufunc(*map(_own, inputs), **{**kwargs, "out": _own(out)})
+            return out
+        return _fake(ufunc(*map(_own, inputs), **kwargs))
+
+    def __array_function__(self, func, types, args, kwargs):
+        if func.__name__ not in FUNCTIONS:
+            raise TypeError(f"{func.__name__}: not among the functions of a device")
+        return _fake(func(*_own(args), **{k: _own(v) for k, v in kwargs.items()}))
+
+    def __getattr__(self, name: str) -> Any:
+        if name in ("dtype", "shape", "ndim", "size", "nbytes"):
+            return getattr(self.values, name)
+        if name in ("astype", "reshape", "sum", "mean", "min", "max", "ravel", "copy"):
+            method = getattr(self.values, name)
+            return lambda *args, **kwargs: _fake(method(*_own(args), **kwargs))
+        raise AttributeError(name)
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __iter__(self):
+        return (FakeArray(item) for item in self.values)
+
+    def __float__(self) -> float:
+        return float(self.values)
+
+    def __bool__(self) -> bool:
+        return bool(self.values)
+
+    def __getitem__(self, index: Any) -> "FakeArray":
+        return FakeArray(np.asarray(self.values[_own(index)]))
+
+    def __setitem__(self, index: Any, value: Any) -> None:
+        self.values[_own(index)] = _own(value)
+
+
+class FakeDevice(Processor):
+    name = "fake"
+
+    def put(self, values, dtype=None):
+        values = values.values if isinstance(values, FakeArray) else values
+        return FakeArray(super().put(values, dtype))
+
+    def get(self, array):
+        return array.values
+
+    def zeros(self, shape, dtype):
+        return FakeArray(super().zeros(shape, dtype))
+
+    def normals(self, keys, name, sample, count, dtype):
+        return FakeArray(super().normals(keys.values, name, sample, count, dtype))
+
+    def uniforms(self, keys, name, sample, count):
+        return FakeArray(super().uniforms(keys.values, name, sample, count))
+
+    def poisson(self, keys, name, sample, mean):
+        return FakeArray(super().poisson(keys.values, name, sample, mean.values))
+
+    def spectrum(self, pictures, mix, shape, black):
+        return FakeArray(super().spectrum(pictures.values, mix.values, shape, black))
+
+    def filtered(self, spectrum, transfer, from_y, from_x):
+        arrays = (array.values for array in (spectrum, transfer, from_y, from_x))
+        return FakeArray(super().filtered(*arrays))
+
+    def evaluated(self, terms, size, window, color):
+        color = None if color is None else color.values
+        return FakeArray(super().evaluated(terms.values, size, window, color))

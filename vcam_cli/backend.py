@@ -1,0 +1,227 @@
+"""Where batches of frames are computed: the processor, or a graphics processor.
+
+Code of the hot path takes arrays of either kind: NumPy hands its functions to the library of the
+array (NEP 13 and NEP 18), so that an effect is written once. What that does not cover is a
+`Device`: new arrays, copies, random numbers, cosine transforms. `Processor` has NumPy's, `cuda.py`
+CuPy's. A copy between both is always written out, as `put` or `get`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any, ClassVar
+
+import numpy as np
+import scipy.fft
+from numpy.typing import DTypeLike
+
+from vcam_cli import counter_noise, memory
+from vcam_cli.arrays import Array
+from vcam_cli.errors import CannotDo
+
+DEVICES = ("cpu", "gpu")
+SHARE = 0.8
+"""Part of the free memory of a device that batches may take."""
+
+
+class Processor:
+    """The processor of this machine, with NumPy's arrays."""
+
+    name: ClassVar[str] = "cpu"
+
+    def describe(self) -> str:
+        """Return the device and its library, for `run.json`."""
+        return f"cpu, NumPy {np.__version__}"
+
+    def put(self, values: Any, dtype: DTypeLike = None) -> Array:
+        """Return values of the processor as an array of the device.
+
+        Parameters
+        ----------
+        values : array_like
+            Values, of any shape.
+        dtype : dtype, optional
+            Type of the array; by default that of the values.
+        """
+        return np.ascontiguousarray(values, dtype)
+
+    def get(self, array: Array) -> Array:
+        """Return an array of the device as one of NumPy."""
+        return array
+
+    def zeros(self, shape: tuple[int, ...], dtype: DTypeLike) -> Array:
+        """Return an array of zeros on the device."""
+        return np.zeros(shape, dtype)
+
+    def free_memory(self) -> int:
+        """Return the memory that batches may take [bytes]."""
+        return int(SHARE * memory.available())
+
+    def wait(self) -> None:
+        """Return when all that was asked of the device is done."""
+
+    def errors(self) -> AbstractContextManager[None]:
+        """Return what raises failures of the device as `CannotDo`."""
+        return nullcontext()
+
+    def keys(self, seeds: Sequence[int]) -> Array:
+        """Return the keys (B,) of seeds, uint64, for the random numbers of frames."""
+        return self.put(np.array([counter_noise.seed_key(seed) for seed in seeds], np.uint64))
+
+    def normals(self, keys: Array, name: str, sample: int, count: int, dtype: DTypeLike) -> Array:
+        """Return standard normal numbers (B, count); `counter_noise` says of which words.
+
+        Parameters
+        ----------
+        keys : Array
+            Keys (B,) of the frames' seeds.
+        name : str
+            Name of the stream.
+        sample : int
+            Index of the sample of an exposure.
+        count : int
+            Numbers of a frame.
+        dtype : dtype
+            Floating-point type.
+        """
+        word = counter_noise.words(keys, name, sample, count)
+        return counter_noise.normals(word).astype(dtype, copy=False)
+
+    def uniforms(self, keys: Array, name: str, sample: int, count: int) -> Array:
+        """Return numbers (B, count) between 0 and 1, float64; parameters as those of `normals`."""
+        return counter_noise.uniforms(counter_noise.words(keys, name, sample, count))
+
+    def poisson(self, keys: Array, name: str, sample: int, mean: Array) -> Array:
+        """Return Poisson numbers of means (B, ...); it may reuse their array [electrons]."""
+        word = counter_noise.words(keys, name, sample, mean[0].size)
+        return counter_noise.poisson(mean, word.reshape(mean.shape))
+
+    def spectrum(
+        self, pictures: Array, mix: Array, shape: tuple[int, int], black: tuple[int, int]
+    ) -> Array:
+        """Return the DCT-II of mixtures of the channels of pictures, unnormalized.
+
+        Parameters
+        ----------
+        pictures : Array
+            Pictures (n, height, width, channels).
+        mix : Array
+            Mixtures (R, channels), in the float type of the pictures.
+        shape : tuple of int
+            Rows and columns of the scene.
+        black : tuple of int
+            Black samples above and left of the picture.
+
+        Returns
+        -------
+        Array
+            Coefficients (n, R, rows, columns).
+        """
+        planes = np.zeros((len(pictures), len(mix), *shape), pictures.dtype)
+        height, width = pictures.shape[1:3]
+        inside = (slice(black[0], black[0] + height), slice(black[1], black[1] + width))
+        planes[:, :, *inside] = np.einsum("mk,nyxk->nmyx", mix, pictures)
+        found: Array = scipy.fft.dctn(planes, type=2, axes=(-2, -1), overwrite_x=True)
+        return found
+
+    def filtered(self, spectrum: Array, transfer: Array, from_y: Array, from_x: Array) -> Array:
+        """Return the terms of every color: coefficients times transfer, summed over mixtures.
+
+        Parameters
+        ----------
+        spectrum : Array
+            Coefficients (n, R, rows, columns).
+        transfer : Array
+            Factors (R, C, terms along y, terms along x).
+        from_y, from_x : Array
+            Coefficient behind every term, int32.
+
+        Returns
+        -------
+        Array
+            Terms (n, C, terms along y, terms along x).
+        """
+        some = spectrum[:, :, from_y][..., from_x]
+        total: Array = some[:, 0, None] * transfer[0]
+        for plane in range(1, len(transfer)):
+            total += some[:, plane, None] * transfer[plane]
+        return total
+
+    def evaluated(
+        self,
+        terms: Array,
+        size: tuple[int, int],
+        window: tuple[slice, slice],
+        color: Array | None,
+    ) -> Array:
+        """Return the DCT-III of terms at the pixels.
+
+        Parameters
+        ----------
+        terms : Array
+            The first terms (n, C, terms along y, terms along x).
+        size : tuple of int
+            Length of the transforms along y and x.
+        window : tuple of slice
+            Rows and columns that are pixels.
+        color : Array or None
+            Index of the color of every pixel (rows, columns), int32; None for all colors of all.
+
+        Returns
+        -------
+        Array
+            Signal (n, rows, columns), not below 0, or (n, C, rows, columns).
+        """
+        whole = np.zeros((*terms.shape[:2], *size), terms.dtype)
+        whole[..., : terms.shape[2], : terms.shape[3]] = terms
+        whole = scipy.fft.dctn(whole, type=3, axes=(-2, -1), overwrite_x=True)[..., *window]
+        if color is None:
+            return whole
+        found: Array = np.take_along_axis(whole, color[None, None], axis=1)[:, 0]
+        return np.maximum(found, 0, out=found)
+
+
+def device(name: str) -> Processor:
+    """Return the device of a name.
+
+    Parameters
+    ----------
+    name : str
+        "cpu" or "gpu".
+
+    Raises
+    ------
+    ValueError
+        For another name.
+    CannotDo
+        Where there is no such device, or no library for it.
+    """
+    if name == "cpu":
+        return Processor()
+    if name != "gpu":
+        raise ValueError(f"device {name!r}; write one of {', '.join(DEVICES)}")
+    from vcam_cli.cuda import open_device
+
+    return open_device()
+
+
+def require(device: Processor, needed: int, what: str) -> None:
+    """Raise CannotDo where a device has too little memory.
+
+    Parameters
+    ----------
+    device : Processor
+        The device.
+    needed : int
+        Memory that is needed [bytes].
+    what : str
+        What needs it, as a message begins.
+    """
+    free = device.free_memory()
+    if needed > free:
+        raise CannotDo(
+            f"{what} need about {needed / 1e9:.3g} GB of the device's memory; {free / 1e9:.3g} GB"
+            f" ({100 * SHARE:g} % of what is free) may be used",
+            "use smaller batches, fewer pixels (array), or --device cpu",
+        )

@@ -1,0 +1,1 @@
+"""Many frames of one camera at once, on the processor or a graphics processor."""

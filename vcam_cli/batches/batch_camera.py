@@ -1,0 +1,134 @@
+"""A camera that takes batches of frames of one sensor on one device."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from vcam_cli.arrays import Array
+from vcam_cli.backend import Processor
+from vcam_cli.effects.base import Effect
+from vcam_cli.effects.noise.companding import CompandedQuantization
+from vcam_cli.effects.noise.quantization import CurvedQuantization
+from vcam_cli.effects.signal_chain import electron_effects, full_well
+from vcam_cli.errors import CannotDo
+from vcam_cli.readout import exposure
+from vcam_cli.readout.batched_sites import SensorMaps, sites
+from vcam_cli.readout.chain import ReadoutChain
+from vcam_cli.simulation.frame import pedestal
+from vcam_cli.solve.solved import Solved
+
+
+@dataclass(frozen=True)
+class _AtGain:
+    """The camera at one gain of the exposure."""
+
+    solved: Solved
+    effects: tuple[Effect, ...]
+    chain: ReadoutChain
+    pedestal: Array | None
+
+
+@dataclass(frozen=True)
+class BatchCamera:
+    """From rates of electrons to codes, for many frames at once."""
+
+    solved: Solved
+    device: Processor
+    dtype: type
+    _kept: dict[float, _AtGain] = field(default_factory=dict)
+
+    @cached_property
+    def maps(self) -> SensorMaps:
+        """What stays with the sensor."""
+        g = self.solved.geometry
+        coarse = self.solved.settings.coarse_normals
+        seed = self.solved.seed.sensor
+        return SensorMaps(self.device, seed, g.rows, g.columns, self.dtype, coarse)
+
+    def at_gain(self, gain: float) -> _AtGain:
+        """Return the camera at a gain; those of before are kept."""
+        if gain not in self._kept:
+            solved = self.solved.at_gain(gain)
+            effects = solved.effects.enabled
+            found = pedestal(solved.electrical, solved.layout, self.dtype)
+            self._kept[gain] = _AtGain(
+                solved,
+                effects,
+                solved.chain.with_effects(effects),
+                None if found is None else self.device.put(found),
+            )
+        return self._kept[gain]
+
+    def take(
+        self, rates: Array, times: Sequence[float], gain: float, seeds: Sequence[int]
+    ) -> tuple[Array, Array]:
+        """Return codes with and without noise.
+
+        Parameters
+        ----------
+        rates : Array
+            Photo-electrons per second (B, rows, columns), on the device [e/s].
+        times : sequence of float
+            Exposure times (B,) [s].
+        gain : float
+            Analog gain of the exposure, of all frames.
+        seeds : sequence of int
+            Frame seeds (B,).
+
+        Returns
+        -------
+        dn : Array
+            Codes (B, rows, columns), uint16 or uint32, on the device [DN].
+        clean : Array
+            Codes without noise and without rounding, in the shape of `dn`, floats [DN].
+        """
+        camera = self.at_gain(gain)
+        effects, adc = camera.effects, camera.chain.adc
+        time: Any = times[0]
+        if any(other != time for other in times):
+            column = np.array(times, self.dtype)[:, None, None]
+            time = self.device.put(column)
+        here = sites(self.maps, seeds, exposure.mean_dark(time, effects))
+        in_front = electron_effects(effects, behind_well=False)
+        held = exposure.mean_electrons(rates, time, effects)
+        well = held.dtype.type(full_well(effects))
+        clean = camera.chain.clipped(camera.chain.to_dn(np.minimum(held, well)))
+        tile = exposure.mean_charge(rates, time, effects, here)
+        tile = exposure.in_wells(tile, in_front, here)
+        codes = exposure.codes(tile, effects, adc, here, camera.pedestal)
+        return codes.astype(exposure.codes_type(adc.bits)), clean
+
+
+def refuse_unsupported(solved: Solved, device: Processor) -> None:
+    """Raise CannotDo for a camera whose readout is not computed in batches.
+
+    Parameters
+    ----------
+    solved : Solved
+        The camera.
+    device : Processor
+        The device.
+    """
+    chain, layout = solved.chain, solved.layout
+    crosstalk = solved.pixel.crosstalk
+    coupled = crosstalk is not None and crosstalk.interpixel_capacitance is not None
+    curved = isinstance(solved.adc, CurvedQuantization | CompandedQuantization)
+    for refused, what in (
+        (chain.merge is not None, "several readouts of a pixel"),
+        (solved.exposure.captures is not None, "several samples of an exposure"),
+        (bool(solved.exposure.bracket), "brackets of exposures"),
+        (layout.binning_groups.count > 1, "binned pixels"),
+        (layout.is_scattered or layout.planes, "pixels in no rows and columns, or stacked ones"),
+        (coupled or bool(solved.pixel.blooming), "interpixel capacitance and blooming"),
+        (solved.pixel.phase_detection is not None, "phase detection"),
+        (curved and device.name != "cpu", "a transfer curve or companding"),
+    ):
+        if refused:
+            raise CannotDo(
+                f"{what}: not computed in batches of frames", "use simulate or --device cpu"
+            )

@@ -1,0 +1,156 @@
+"""The light of many pictures of one size in a camera's pixels, all effects acting.
+
+On a device it is one filter, where a picture takes no more than one; elsewhere the processor
+computes the light of each picture, as for a single frame, and it is copied.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vcam_cli.arrays import Array
+from vcam_cli.backend import Processor
+from vcam_cli.effects.base import of_kind
+from vcam_cli.effects.pixel_signal import NeighborSharing, TemporalGain, Transport, VeilingGlare
+from vcam_cli.image_formation.batched_filter import BatchedFilter
+from vcam_cli.image_formation.photon_rate import gain_maps, spread_over_mosaic
+from vcam_cli.image_formation.strategies import picture_filter
+from vcam_cli.progress import Stages
+from vcam_cli.readout.layout import Layout
+from vcam_cli.scenes.image import ImageScene
+from vcam_cli.simulation.pipeline import prepare_light
+from vcam_cli.simulation.run import Run
+from vcam_cli.simulation.scene_light import SceneLight, scene_light
+from vcam_cli.solve.solved import Solved
+
+
+@dataclass(frozen=True)
+class DeviceLight:
+    """Light that a device computes."""
+
+    device: Processor
+    batched: BatchedFilter
+    acting: tuple[Array | VeilingGlare, ...]
+    """Gains (rows, columns) on the device, and glares, in their order."""
+    layout: Layout
+    cut: tuple[slice, slice]
+    """Rows and columns of a picture that are the scene."""
+    black: tuple[int, int]
+    """Black samples above and left of them."""
+    where = "device"
+
+    def rates(self, pictures: Array) -> Array:
+        """Return the photo-electrons per second of every pixel.
+
+        Parameters
+        ----------
+        pictures : Array
+            Pictures (n, height, width, channels) in linear light, on the device.
+
+        Returns
+        -------
+        Array
+            Rates (n, rows, columns) on the device [e/s].
+        """
+        kind = self.batched.transfer.dtype
+        seen = pictures[:, *self.cut].astype(kind, copy=False)
+        light = self.batched.apply(seen, self.black)
+        for effect in self.acting:
+            if isinstance(effect, VeilingGlare):
+                spread_over_mosaic(light, self.layout.mosaic, effect)
+            else:
+                light *= effect
+        return light
+
+    def bytes_per_picture(self, channels: int) -> int:
+        """Return the memory of the device that one picture takes [bytes]."""
+        return self.batched.bytes_per_picture(channels)
+
+
+@dataclass(frozen=True)
+class ProcessorLight:
+    """Light that the processor computes, picture by picture."""
+
+    device: Processor
+    solved: Solved
+    workers: int
+    where = "cpu"
+
+    def rates(self, pictures: Array) -> Array:
+        """Return the photo-electrons per second of every pixel, as those of `DeviceLight`."""
+        run = Run(self.workers, Stages())
+        host = self.device.get(pictures)
+        found = [prepare_light(self.solved, picture, run).rate for picture in host]
+        return self.device.put(np.array(found))
+
+    def bytes_per_picture(self, channels: int) -> int:
+        """Return the memory of the device that one picture takes [bytes]."""
+        g = self.solved.geometry
+        return g.rows * g.columns * self.solved.settings.float_width // 8
+
+
+def seen_by(solved: Solved, shape: tuple[int, int, int], workers: int) -> SceneLight:
+    """Return the way of the light of pictures of a shape: that of an even one.
+
+    Parameters
+    ----------
+    solved : Solved
+        The camera, before a picture.
+    shape : tuple of int
+        Height, width and channels.
+    workers : int
+        Number of threads.
+    """
+    return scene_light(solved, np.ones(shape, np.float32), Run(workers, Stages()))
+
+
+def pictures_light(
+    seen: SceneLight, shape: tuple[int, int, int], workers: int, device: Processor
+) -> DeviceLight | ProcessorLight:
+    """Return what brings pictures of a shape to the pixels.
+
+    Parameters
+    ----------
+    seen : SceneLight
+        The way of the light of such a picture.
+    shape : tuple of int
+        Height, width and channels.
+    workers : int
+        Number of threads of the processor.
+    device : Processor
+        The device.
+    """
+    solved, scene, layout = seen.solved, seen.scene, seen.solved.layout
+    by_processor = ProcessorLight(device, solved, workers)
+    late = of_kind(seen.path.effects, TemporalGain, Transport)
+    # Crosstalk acts behind the light, and is among the effects on charge.
+    shared = of_kind(solved.effects.enabled, NeighborSharing)
+    if layout.planes or layout.is_scattered or late or shared:
+        return by_processor
+    found = picture_filter(seen.path, scene)
+    if found is None:
+        return by_processor
+    image_filter, dtype = found
+    assert isinstance(scene, ImageScene)
+    mosaic = layout.mosaic
+    color = layout.color if len(mosaic.colors) > 1 else np.zeros(_size(layout), np.int32)
+    acting = tuple(
+        each if isinstance(each, VeilingGlare) else device.put(each)
+        for each in gain_maps(seen.path, dtype)
+    )
+    height, width = scene.picture.shape[:2]
+    top, left = (shape[0] - height) // 2, (shape[1] - width) // 2
+    return DeviceLight(
+        device=device,
+        batched=BatchedFilter.of(image_filter, color, dtype, device),
+        acting=acting,
+        layout=layout,
+        cut=(slice(top, top + height), slice(left, left + width)),
+        black=scene.black,
+    )
+
+
+def _size(layout: Layout) -> tuple[int, int]:
+    return layout.lattice.rows, layout.lattice.columns
