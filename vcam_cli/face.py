@@ -74,10 +74,11 @@ def characterize(
     keep_frames: bool = False,
     report: bool = False,
     formats: Sequence[str] = (),
+    device: str = "cpu",
 ) -> Characterization:
     """Return what a camera measures on a bench, beside its closed forms: `vcam characterize`.
 
-    keep_frames: also write the flat and dark frames into `out`.
+    keep_frames: also write the flat and dark frames into `out`; device: as that of `simulate`.
     """
     from vcam_cli.characterization import characterize as study
     from vcam_cli.characterization import output
@@ -89,7 +90,7 @@ def characterize(
         raise ValueError("keep_frames needs a folder; write out='out/bench'")
     with _folder(out, "characterize.json", lambda: provenance.inputs(model)) as folder:
         keeper = FrameFiles(folder.new) if keep_frames and folder is not None else None
-        found = study.characterize(model, _threads(workers), observer(watch), keeper)
+        found = study.characterize(model, _threads(workers), observer(watch), keeper, device)
         if folder is not None:
             output.write(found, model, folder, report, formats)
     return found

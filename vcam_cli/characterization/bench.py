@@ -30,6 +30,7 @@ import numpy as np
 
 from vcam_cli.accuracy_study.ablation import with_effects, with_exposure_time
 from vcam_cli.arrays import Array
+from vcam_cli.backend import Processor
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry, pixel_centers
 from vcam_cli.camera.derived.mosaic import BLOCKS, NONE, mosaic
@@ -40,7 +41,7 @@ from vcam_cli.effects.signal_chain import noise_sources
 from vcam_cli.errors import bad
 from vcam_cli.progress import Stages
 from vcam_cli.quality.mtf import Lattice
-from vcam_cli.readout import exposure
+from vcam_cli.readout import device_capture, exposure
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.simulate import prepare
 from vcam_cli.solve.raised_codes import RaisedCodes
@@ -81,12 +82,15 @@ class Bench:
         Steps by which the codes are moved up [DN].
     workers : int
         Threads.
+    device : Processor or None
+        Where frames are taken; None for those threads.
     """
 
     camera: Camera
     ready: Prepared
     pedestal: int
     workers: int
+    device: Processor | None = None
 
     @property
     def time(self) -> float:
@@ -203,9 +207,11 @@ class Bench:
                 "is characterized on monochrome arrays",
                 "write array.pattern: monochrome, or remove it",
             )
-        codes = exposure.capture(
-            *(rate, time, active, adc, seeds, self.workers), settle=ready.settle
-        )[1]
+        given = rate, time, active, adc, seeds
+        if self.device is not None and self.device.name != "cpu":
+            codes = device_capture.capture(*given, self.device, settle=ready.settle)[1]
+        else:
+            codes = exposure.capture(*given, self.workers, settle=ready.settle)[1]
         return codes.astype(rate.dtype)
 
     def color_pixels(self, frame: Array, color: str) -> Array:

@@ -11,6 +11,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
+from vcam_cli import backend
+from vcam_cli.backend import Processor
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.readouts import has_several, readouts
 from vcam_cli.camera.expectations import Limit
@@ -19,7 +21,7 @@ from vcam_cli.characterization.datasheet import COLUMNS, Quantity, notes, quanti
 from vcam_cli.characterization.exposures import Channel, measure_channels
 from vcam_cli.characterization.kept_frames import Keeper
 from vcam_cli.characterization.merged_snr import MergedSnr, measure_merged_snr
-from vcam_cli.errors import BadInput
+from vcam_cli.errors import BadInput, CannotDo
 from vcam_cli.floats import own_float_errors
 from vcam_cli.parallel import available_workers
 from vcam_cli.progress import Observer, Silent, Stages
@@ -100,6 +102,7 @@ def characterize(
     workers: int | None = None,
     watch: Observer | None = None,
     keeper: Keeper | None = None,
+    device: str = "cpu",
 ) -> Characterization:
     """Measure a camera.
 
@@ -113,6 +116,8 @@ def characterize(
         Told of stages.
     keeper : Keeper, optional
         Shown the flat and dark frames.
+    device : str, optional
+        "gpu" takes the frames on a graphics processor.
 
     Raises
     ------
@@ -121,17 +126,25 @@ def characterize(
     """
     try:
         stages, workers = Stages(watch=watch or Silent()), workers or available_workers()
+        found = backend.device(device)
         if has_several(camera):
+            if found.name != "cpu":
+                message = "several readouts of a pixel: not measured on a graphics processor"
+                raise CannotDo(message, "use --device cpu")
             return _of_readouts(camera, workers, stages, keeper)
-        return _of_one(camera, workers, stages, keeper)
+        return _of_one(camera, workers, stages, keeper, found)
     except BadInput as error:
         raise error.with_places(camera.locate) from None
 
 
 def _of_one(
-    camera: Camera, workers: int, stages: Stages, keeper: Keeper | None
+    camera: Camera,
+    workers: int,
+    stages: Stages,
+    keeper: Keeper | None,
+    device: Processor | None = None,
 ) -> Characterization:
-    bench = prepare_bench(camera, workers, stages)
+    bench = replace(prepare_bench(camera, workers, stages), device=device)
     channels = measure_channels(bench, stages, keeper)
     numbers = tuple(q for channel in channels for q in quantities(bench, channel))
     return Characterization(bench, channels, numbers, tuple(notes(bench, channels)), stages)

@@ -29,6 +29,7 @@ def characterize(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
     workers: options.Workers = None,
+    device: options.Device = "cpu",
     wants_report: options.Report = False,
     formats: options.Formats = None,
     expect: options.Expect = None,
@@ -56,7 +57,7 @@ def characterize(
     path = out or Path("out") / model.name
     with Progress(quiet) as bar:
         found = face.characterize(
-            model, path, workers, bar, keep_frames, wants_report, formats or ()
+            model, path, workers, bar, keep_frames, wants_report, formats or (), device
         )
     for note in found.notes:
         options.say(note, quiet)

@@ -234,6 +234,28 @@ Workers = Annotated[
 ]
 
 
+def _device(name: str) -> str:
+    """Refuse another name than those of devices, and a device that is not there."""
+    if name != "cpu":
+        from vcam_cli import backend
+
+        if name not in backend.DEVICES:
+            raise typer.BadParameter(f"{name!r} is no device; write cpu or gpu")
+        backend.device(name)
+    return name
+
+
+Device = Annotated[
+    str,
+    typer.Option(
+        "--device",
+        metavar="cpu|gpu",
+        callback=_device,
+        help="gpu: noise and readout on a graphics processor, of data sets the light, too.",
+    ),
+]
+
+
 def overrides(
     sets: Sequence[str] | None, seed: int | None = None, accuracy: str | None = None
 ) -> list[str]:

@@ -19,6 +19,7 @@ def run(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
     workers: options.Workers = None,
+    device: options.Device = "cpu",
     report: options.Report = False,
     frames: options.Frames = None,
     fps: options.FrameRate = None,
@@ -54,11 +55,11 @@ def run(
     place = OutputFolder(out or Path("out") / model.name, inputs=inputs)
     with place as folder, Progress(quiet) as progress:
         if frames is None:
-            result = simulate(model, workers, progress)
+            result = simulate(model, workers, progress, device=device)
             outputs.write(result, folder)
         else:
             assert fps is not None
-            result = write_sequence(model, frames, fps, folder, workers, progress)
+            result = write_sequence(model, frames, fps, folder, workers, progress, device)
         record = outputs.finish(result, folder, inputs, lambda: time.perf_counter() - start)
     for note in result.notes:
         options.say(note, quiet)

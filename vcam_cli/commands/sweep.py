@@ -80,6 +80,7 @@ def sweep(
     scheduler: Scheduler = None,
     shard: Shard = None,
     fresh: Fresh = False,
+    device: options.Device = "cpu",
     wants_report: options.Report = False,
     formats: options.Formats = None,
     expect: options.Expect = None,
@@ -121,6 +122,7 @@ def sweep(
                     wants_report,
                     formats or (),
                     expect or (),
+                    device,
                 )
         except KeyboardInterrupt as error:
             options.say("interrupted; finished points are kept, and the same command continues")

@@ -493,6 +493,8 @@ class Quantizer(Effect):
     removable = False
     origin = "readout"
     bits: int
+    on_device: ClassVar[bool] = True
+    """Whether `apply` takes arrays of a graphics processor."""
 
     @property
     def highest_code(self) -> int:

@@ -18,6 +18,7 @@ from vcam_cli import counter_noise
 from vcam_cli.arrays import Array
 from vcam_cli.backend import Processor
 from vcam_cli.effects.signal_chain import Site
+from vcam_cli.readout.exposure import LAYER
 from vcam_cli.rng import BLOCK_ROWS, blocks, stream
 
 
@@ -32,6 +33,8 @@ class SensorMaps:
     columns: int
     dtype: type
     coarse_normals: bool = False
+    layer: int = 0
+    """Index of the layer of stacked pixels."""
     maps: dict[str, Array] = field(default_factory=dict)
 
     def get(self, name: str, make: Callable[[Site], Array]) -> Array:
@@ -58,17 +61,18 @@ class SensorMaps:
     def _site(self, block: slice) -> Site:
         """Return the processor's site of a block, as `exposure.sites` has it."""
         opened: dict[str, np.random.Generator] = {}
+        first = self.layer << LAYER
 
         def of_block(name: str) -> np.random.Generator:
             if name not in opened:
-                opened[name] = stream(self.seed, name, block=block.start // BLOCK_ROWS)
+                opened[name] = stream(self.seed, name, block=first + block.start // BLOCK_ROWS)
             return opened[name]
 
         return Site(
             rows=block.stop - block.start,
             columns=self.columns,
             stream=of_block,
-            line_stream=partial(stream, self.seed, block=0),
+            line_stream=partial(stream, self.seed, block=first),
             dtype=self.dtype,
             first_row=block.start,
             array_rows=self.rows,

@@ -5,20 +5,24 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.backend import Processor
 from vcam_cli.camera.derived.electrical import Electrical
 from vcam_cli.camera.scene.sources import Layers
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.pixel_signal import Gain
+from vcam_cli.errors import CannotDo
 from vcam_cli.floats import own_float_errors
 from vcam_cli.image_formation import half_images, warps
 from vcam_cli.image_formation.pixel_response import axis_levels
 from vcam_cli.progress import Stages
 from vcam_cli.readout import (
     binned_readout,
+    device_capture,
     exposure,
     nondestructive_samples,
     several_readouts,
@@ -52,6 +56,8 @@ class Frame(Prepared):
     """Codes (rows, columns) of the left and right halves of pixels [DN]; None of whole pixels."""
     photocurrent: Array | None = None
     """(rows, columns) what the samples tell of the light [e/s]; None of a single exposure."""
+    device: str = "cpu"
+    """What charge, noise and codes were computed on; all else is the processor's."""
 
     def sample(self, number: int) -> Frame:
         """Return one of the samples as a frame of its own.
@@ -262,7 +268,9 @@ def _phase_codes(
     return left, right
 
 
-def take_frame(ready: Prepared, workers: int, stages: Stages | None = None) -> Frame:
+def take_frame(
+    ready: Prepared, workers: int, stages: Stages | None = None, device: Processor | None = None
+) -> Frame:
     """Return one frame of a camera that is ready for it.
 
     Parameters
@@ -273,13 +281,24 @@ def take_frame(ready: Prepared, workers: int, stages: Stages | None = None) -> F
         Number of threads; the result does not depend on it.
     stages : Stages or None, optional
         Stopwatch of the run's stages.
+    device : Processor or None, optional
+        Where charge, noise and codes are computed; by default by the processor's threads.
 
     Returns
     -------
     Frame
         Frame with electrons and codes.
+
+    Raises
+    ------
+    CannotDo
+        For a readout that a device does not compute.
     """
     stages, solved = stages or Stages(), ready.solved
+    on_device = device is not None and device.name != "cpu"
+    if on_device and (ready.chain.merge is not None or ready.times):
+        what = "several samples of an exposure" if ready.times else "several readouts of a pixel"
+        raise CannotDo(f"{what}: not computed on a graphics processor", "use --device cpu")
     with stages("capture"):
         active, adc = ready.plan.active, ready.chain.adc
         seeds = {"sensor": solved.seed.sensor, "frame": solved.seed.frame}
@@ -292,14 +311,17 @@ def take_frame(ready: Prepared, workers: int, stages: Stages | None = None) -> F
             known |= {"electrons": several.electrons, "dn": several.dn}
             return Frame(**known, readouts_dn=several.readouts)
         if not times:
-            take = partial(
-                exposure.capture,
-                adc=adc,
-                seeds=seeds,
-                workers=workers,
-                coarse_normals=coarse,
-                pedestal=pedestal(ready.electrical, ready.layout, ready.rate.dtype),
-            )
+            shared: dict[str, Any] = {
+                "adc": adc,
+                "seeds": seeds,
+                "coarse_normals": coarse,
+                "pedestal": pedestal(ready.electrical, ready.layout, ready.rate.dtype),
+            }
+            if device is not None and on_device:
+                take = partial(device_capture.capture, device=device, **shared)
+                known |= {"device": device.describe()}
+            else:
+                take = partial(exposure.capture, workers=workers, **shared)
             groups, time = ready.layout.binning_groups, ready.exposure_time
             electrons, dn = binned_readout.read(
                 *(groups, ready.rate, time, active, take, adc.bits, ready.full_charge),

@@ -139,7 +139,7 @@ def take(
         frame, notes = _take_bracket(camera, run, shared)
     else:
         ready, notes = prepare(camera, run, shared)
-        frame = take_frame(ready, run.workers, run.stages)
+        frame = take_frame(ready, run.workers, run.stages, run.device)
     return frame, picture_of(frame, run.workers), notes
 
 
@@ -151,7 +151,7 @@ def _take_bracket(camera: Camera, run: Run, shared: Shared) -> tuple[Frame, tupl
     taken = []
     for single in bracket_cameras(camera):
         ready, notes = prepare(single, run, shared)
-        taken.append((take_frame(ready, run.workers, run.stages), notes))
+        taken.append((take_frame(ready, run.workers, run.stages, run.device), notes))
     frame, notes = taken[longest_of(camera)]
     with run.stages("reconstruction"):
         merged = merged_bracket(frame, [each for each, _ in taken], camera.exposure, run.workers)

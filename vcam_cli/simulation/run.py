@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
+from vcam_cli.backend import Processor
 from vcam_cli.image_formation.rate_cache import RateCache
 from vcam_cli.progress import Stages
 
@@ -18,6 +19,8 @@ class Run:
     """Observer of the stages."""
     rate_cache: RateCache | None = None
     """Cache of the light for further cameras."""
+    device: Processor = field(default_factory=Processor)
+    """Where charge, noise and codes are computed."""
     earlier: float = 0.0
     """Estimated time of what came before, such as the autofocus; the plan counts it [s]."""
 
@@ -34,7 +37,7 @@ class Run:
         Run
             Run with the same number of threads.
         """
-        return Run(self.workers, Stages(), rate_cache)
+        return Run(self.workers, Stages(), rate_cache, self.device)
 
     def after(self, seconds: float) -> Run:
         """Return the same computation behind further work.

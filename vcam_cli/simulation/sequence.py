@@ -89,7 +89,12 @@ def _require_room(camera: Camera, rate: float) -> None:
 
 
 def frames(
-    camera: Camera, count: int, rate: float, workers: int | None, watch: Observer
+    camera: Camera,
+    count: int,
+    rate: float,
+    workers: int | None,
+    watch: Observer,
+    device: str = "cpu",
 ) -> Iterator[tuple[Camera, Result]]:
     """Yield the camera of every frame of a sequence, and what it takes.
 
@@ -104,6 +109,8 @@ def frames(
         Number of threads; results do not depend on it.
     watch : Observer
         Observer of stages.
+    device : str, optional
+        As that of `simulate`.
     """
     settings, reference = None, camera.exposure.reference
     shared = Shared(RateCache(LIGHT))
@@ -113,7 +120,7 @@ def frames(
             each = exposure_control.set_exposure(each, settings)
             timed = each.exposure.model_copy(update={"reference": reference})
             each = each.model_copy(update={"exposure": timed})
-        result = simulate(each, workers, watch, shared)
+        result = simulate(each, workers, watch, shared, device)
         if camera.exposure.auto is not None:
             if reference is None:  # where the first frame has it, all others do
                 reference = result.exposure_time / 2 + solved.lines.last / 2
@@ -128,6 +135,7 @@ def write_sequence(
     folder: OutputFolder,
     workers: int | None,
     watch: Observer,
+    device: str = "cpu",
 ) -> Result:
     """Write frames/raw_0001.exr, frames/render_0001.png and so on, frames.csv and strip.png.
 
@@ -143,6 +151,8 @@ def write_sequence(
         Number of threads; results do not depend on it.
     watch : Observer
         Observer of stages.
+    device : str, optional
+        As that of `simulate`.
 
     Returns
     -------
@@ -155,7 +165,9 @@ def write_sequence(
     program = ffmpeg()
     with ExitStack() as stack:
         video: VideoWriter | None = None
-        for number, (each, result) in enumerate(frames(camera, count, rate, workers, watch)):
+        for number, (each, result) in enumerate(
+            frames(camera, count, rate, workers, watch, device)
+        ):
             if first is None:
                 missing = bool(camera.output.render) and program is None
                 told = sequence_notes(result.remarks) + ((NO_VIDEO,) if missing else ())

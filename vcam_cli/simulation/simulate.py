@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from vcam_cli import backend
 from vcam_cli.arguments import brief, require_folder, require_whole
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
@@ -86,6 +87,7 @@ def simulate(
     workers: int | None = None,
     watch: Observer | Callback | None = None,
     shared: Shared | None = None,
+    device: str = "cpu",
 ) -> Result:
     """Simulate `camera` looking at its scene.
 
@@ -100,13 +102,16 @@ def simulate(
     shared : Shared, optional
         What cameras before this one had in common with it; results do not depend on it. By
         default the light of the last cameras, 64 MB of it, and their picture up to 64 MB.
+    device : str, optional
+        "gpu" draws noise and reads the charge on a graphics processor, with other random numbers
+        of the same statistics; the light is the processor's. See `frames` for many pictures.
 
     Raises
     ------
     BadInput
         For a camera that contradicts itself, with positions in its file.
     CannotDo
-        Where memory does not suffice.
+        Where memory does not suffice, or there is no such device.
     TypeError
         For what is no camera, such as the name of a file, and other arguments of wrong types.
     """
@@ -117,7 +122,8 @@ def simulate(
     stages = Stages(watch=observer(watch))
     try:
         shared = shared or RECENT.shared_with(camera)
-        return _simulate(camera, workers or threads(camera), stages, shared)
+        run = Run(workers or threads(camera), stages, shared.rate_cache, backend.device(device))
+        return _simulate(camera, run, shared)
     except BadInput as error:
         raise error.with_places(camera.locate) from None
 
@@ -159,10 +165,9 @@ def prepare(
         raise error.with_places(camera.locate) from None
 
 
-def _simulate(camera: Camera, workers: int, stages: Stages, shared: Shared) -> Result:
-    run = Run(workers, stages, shared.rate_cache)
+def _simulate(camera: Camera, run: Run, shared: Shared) -> Result:
     frame, steps, notes = pipeline.take(camera, run, shared)
-    result = Result(frame, stages, workers, steps, remarks.Notes(frame, notes))
+    result = Result(frame, run.stages, run.workers, steps, remarks.Notes(frame, notes))
     if needs_picture(
         frame.solved
     ):  # what is wrong with its steps is said before anything is written

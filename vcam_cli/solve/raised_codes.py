@@ -31,6 +31,11 @@ class RaisedCodes(Quantizer):
         return self.highest
 
     @property
+    def on_device(self) -> bool:  # type: ignore[override]
+        """Whether `apply` takes arrays of a graphics processor."""
+        return self.adc.on_device
+
+    @property
     def bits(self) -> int:  # type: ignore[override]
         """Bits of the highest code."""
         return self.highest.bit_length()

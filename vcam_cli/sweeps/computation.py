@@ -57,7 +57,7 @@ def computed_sweep(
     extras: Extras,
 ) -> SweepResult:
     """Compute the missing points of a sweep and write everything; request: see `request_hash`."""
-    grid = sweep_points.grid(study, sets)
+    grid = sweep_points.grid(study, sets, device=execution.device)
     cameras = StudyCameras(grid, sets)
     planned, expected = figures.plan(cameras), expectations.plan(cameras)
     hashes = {str(path): hash_file(path) for path in grid.inputs}
@@ -69,7 +69,7 @@ def computed_sweep(
         former = folder.begin({"name": study.model.name, "versions": whole}, grid.hash)
         if changed := _changes(former.get("versions"), versions):
             tell(f"points of other code are left out, and computed again ({changed})")
-        points = _Points(grid, folder, execution.fresh, versions)
+        points = _Points(grid, folder, execution, versions)
         points.read_finished()
         if folder.corrupted:
             names, shown = list(folder.corrupted), ", ".join(list(folder.corrupted)[:3])
@@ -92,6 +92,7 @@ def computed_sweep(
             asked = request if points.are_final and not result.unmade else ""
             plain = study.model.model_dump(mode="json")
             record = result.record() | {"study": plain, "hashes": hashes, "asked": asked}
+            record |= {"device": execution.device}
             report = partial(sweep_report.report_file, result) if extras.report else None
             files = in_formats(files, extras.formats)
             folder.finish(files, record, grid.inputs, report)
@@ -102,10 +103,11 @@ class _Points:
     """The points of a sweep, and their records."""
 
     def __init__(
-        self, grid: Grid, folder: SweepFolder, fresh: bool, versions: dict[str, str]
+        self, grid: Grid, folder: SweepFolder, execution: Execution, versions: dict[str, str]
     ) -> None:
         self.outcomes: dict[str, Outcome] = {}
-        self._folder, self._fresh, self._versions = folder, fresh, versions
+        self._folder, self._fresh, self._versions = folder, execution.fresh, versions
+        self._device = execution.device
         model = grid.study.model
         self._frames = tuple(FRAMES[what] for what in model.keep)
         self._points = {p.id: p for p in grid.points if p.camera is not None}
@@ -149,7 +151,8 @@ class _Points:
             assert camera is not None
             if point.content not in lights:
                 lights[point.content] = light_key(camera)
-            job = Job(point.id, _without_texts(camera), self._metrics, self._keep, self._versions)
+            bare, wanted = _without_texts(camera), (self._metrics, self._keep)
+            job = Job(point.id, bare, *wanted, self._versions, self._device)
             groups.setdefault(lights[point.content], []).append(job)
         return list(groups.values())
 

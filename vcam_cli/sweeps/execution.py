@@ -34,6 +34,8 @@ class Execution:
     """The address of a Dask scheduler that computes in their place."""
     fresh: bool = False
     """Whether finished points are computed again."""
+    device: str = "cpu"
+    """Where noise and readout are computed."""
 
     def __post_init__(self) -> None:
         if self.scheduler is not None:

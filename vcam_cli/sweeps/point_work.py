@@ -51,6 +51,8 @@ class Job:
     """The frames that are kept, see `FRAMES`."""
     versions: dict[str, str]
     """The hash of the code, and the versions of the libraries, of the process that asks."""
+    device: str = "cpu"
+    """Where noise and readout are computed."""
 
     def compute(self, threads: int, shared: Shared) -> tuple[dict[str, float], dict[str, bytes]]:
         """Return the metrics of the point, and the files that are kept of it."""
@@ -58,7 +60,7 @@ class Job:
         if "render" not in self.keep:
             output = camera.output.model_copy(update={"render": None})
             camera = camera.model_copy(update={"output": output})
-        result = simulate(camera, threads, shared=shared)
+        result = simulate(camera, threads, shared=shared, device=self.device)
         metrics = {name: result.metrics[name] for name in self.metrics}
         return metrics, {FRAMES[what]: _frame(what, result) for what in self.keep}
 

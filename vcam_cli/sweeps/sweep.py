@@ -62,6 +62,7 @@ def sweep(
     report: bool = False,
     formats: Sequence[str] = (),
     expect: Sequence[str] = (),
+    device: str = "cpu",
 ) -> SweepResult:
     """Run a sweep study, or its missing points, and write its tables and plots.
 
@@ -71,13 +72,14 @@ def sweep(
     place; shard: (i, n), the i-th of n shares of the points; fresh: computes all of them again;
     watch follows the progress, as that of `simulate` does; tell gets messages; report: also writes
     report.html; formats: "svg", "pdf" of plots, beside PNG; expect: limits "METRIC >= VALUE" that
-    every point keeps, or "optimum <= 7 um": see `missed` of the result. Raises BadInput (wrong
+    every point keeps, or "optimum <= 7 um": see `missed` of the result; device: as that of
+    `simulate`. Raises BadInput (wrong
     study, or no camera of it is valid), CannotDo (disk, scheduler), and TypeError or ValueError for
     arguments that are none of these.
     """
     start = time.perf_counter()
     _check_arguments(study, out, sets, workers, shard)
-    execution = Execution(Share(*shard) if shard else None, workers, scheduler, fresh)
+    execution = Execution(Share(*shard) if shard else None, workers, scheduler, fresh, device)
     watch, tell = observer(watch), tell or (lambda _: None)
     watch.begin("points")
     own, sets = split_sets(sets, Sweep.model_fields)
@@ -89,7 +91,7 @@ def sweep(
     for note in notes(expected):
         tell(note)
     extras = Extras(report, tuple(formats))
-    request = request_hash(file, sets, extras)
+    request = request_hash(file, sets, extras, device)
     result = None if fresh else finished_result(place, file, request)
     if result is None:
         # With the whole engine behind it: a sweep that is finished starts without.

@@ -92,7 +92,12 @@ class Grid:
         return tuple(dict.fromkeys(p for point in self.points for p in point.problems))
 
 
-def grid(study: StudyFile, sets: Sequence[str] = (), folder: Path | None = None) -> Grid:
+def grid(
+    study: StudyFile,
+    sets: Sequence[str] = (),
+    folder: Path | None = None,
+    device: str = "cpu",
+) -> Grid:
     """Return the points of a study, with `--set` overrides laid over every camera.
 
     Raises BadInput where a path names nothing, and where no point at all has a valid camera.
@@ -105,7 +110,7 @@ def grid(study: StudyFile, sets: Sequence[str] = (), folder: Path | None = None)
     _refuse_too_many(study.model, repeated, [case.parameters for case in cases.values()])
     points: list[Point] = []
     for case in cases.values():
-        points += _points(study.model, case, over, repeated)
+        points += _points(study.model, case, over, repeated, device)
     found = Grid(
         study=study,
         case_parameters=tuple(
@@ -163,7 +168,7 @@ def _refuse_too_many(
 
 
 def _points(
-    model: Sweep, case: StudyCase, over: Node, repeated: dict[str, Parameter]
+    model: Sweep, case: StudyCase, over: Node, repeated: dict[str, Parameter], device: str
 ) -> Iterator[Point]:
     """Yield the points of a case, in their order."""
     parameters = [*case.parameters.values(), *repeated.values()]
@@ -188,7 +193,7 @@ def _points(
             yield from itertools.repeat(refused, model.seeds)
             continue
         camera = camera.model_copy(update={"name": case.name.replace("/", "-")})
-        content = _content(camera, model)
+        content = _content(camera, model, device)
         for i in range(model.seeds):
             own = with_next_seed(camera, i)
             point = hash_text(f"{content} {own.seed.frame}")[:32]
@@ -222,13 +227,14 @@ def with_next_seed(camera: Camera, number: int) -> Camera:
     return camera.model_copy(update={"seed": seed})
 
 
-def _content(camera: Camera, model: Sweep) -> str:
+def _content(camera: Camera, model: Sweep, device: str) -> str:
     """Return the hash of all that a point's numbers depend on, but for the seed of its frame."""
     form = camera.model_dump(mode="json")
     for name in ("name", "quality", "expect", *(() if model.keep else ("output",))):
         form.pop(name, None)
     form["seed"] = form["seed"]["sensor"]
-    return hash_of(camera, form, {"metrics": sorted(model.metrics), "keep": sorted(model.keep)})
+    asked = {"metrics": sorted(model.metrics), "keep": sorted(model.keep)}
+    return hash_of(camera, form, asked | ({} if device == "cpu" else {"device": device}))
 
 
 def hash_of(camera: Camera, form: dict[str, Any], asked: dict[str, Any]) -> str:

@@ -261,10 +261,11 @@ class SweepResult:
         }
 
 
-def request_hash(study: StudyFile, sets: Sequence[str], extras: Extras) -> str:
+def request_hash(study: StudyFile, sets: Sequence[str], extras: Extras, device: str = "cpu") -> str:
     """Return the hash of what is asked, but for the contents of the files that it names.
 
-    sets: overrides "PATH=VALUE" laid over every camera. Raises BadInput for another text.
+    sets: overrides "PATH=VALUE" laid over every camera; device: where noise is drawn. Raises BadInput
+    for another text.
     """
     folder = current_folder()
     over = cameras.overlay(sets, folder)
@@ -273,7 +274,7 @@ def request_hash(study: StudyFile, sets: Sequence[str], extras: Extras) -> str:
     places = [str(study.file), str(folder) if sets else ""]
     versions = provenance.versions() | {"matplotlib": version("matplotlib")}
     asked = [study.tree.plain(), over.plain(), bases, words, places, versions, asdict(extras)]
-    return hash_text(to_json(asked))
+    return hash_text(to_json(asked if device == "cpu" else [*asked, device]))
 
 
 def _files_named(base: Document[Camera]) -> list[Any]:

@@ -30,6 +30,7 @@ class CompandedQuantization(Quantizer):
     reference = "piecewise linear companding, as in data sheets of automotive sensors"
     absent = "every camera has it"
     seconds_per_pixel = 25e-9
+    on_device = False
 
     @classmethod
     def from_camera(cls, camera: Camera, geometry: Geometry) -> None:

@@ -187,6 +187,7 @@ class CurvedQuantization(Quantizer):
     reference = "Chen 2003, section 2.4.1 and Fig 2.18"
     absent = Quantization.absent
     seconds_per_pixel = 200e-9
+    on_device = False
 
     @classmethod
     def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
