@@ -6,11 +6,13 @@ seconds; and "largest": no file may grow beyond so many bytes. The answer has th
 (negative for the signal it died of), what it printed, its seconds, and its peak of memory.
 
 Why forks: a run takes a tenth of a second, most of a process's second is the loading of libraries.
-A fork that hangs tells where, and ends.
+They are loaded before the first order, and no more than that: threads that a library begins when
+it is used would not be there in a fork. A fork that hangs tells where, and ends.
 """
 
 import contextlib
 import faulthandler
+import importlib
 import json
 import os
 import resource
@@ -132,12 +134,40 @@ def _ended() -> int:
     return 0
 
 
-def _load() -> None:
-    """Imports what runs and sweeps import."""
-    from matplotlib import figure  # noqa: F401
-    from matplotlib.backends import backend_agg  # noqa: F401
+STUDY = """\
+kind: sweep
+name: study
+camera: starter
+vary: {array.rows: {values: [16, 17]}}
+cases: {a: {array.columns: 24, accuracy: draft, quality: [mse]}}
+metrics: [mse]
+keep: [raw]
+"""
 
-    from vcam_cli.commands import main, run, sweep  # noqa: F401
+
+def _load() -> None:
+    """Imports what a sweep imports and a run, which a fork makes to tell it."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder)
+        (path / "study.yaml").write_text(STUDY)
+        sets = [f"--set={s}" for s in ("array.rows=16", "array.columns=24", "quality=[mse]")]
+        process = os.fork()
+        if process == 0:
+            with (path / "names").open("w") as names, (path / "said").open("w") as said:
+                for args in (["run", "starter", *sets], ["sweep", "study.yaml", "--workers", "1"]):
+                    os.dup2(said.fileno(), 1)
+                    os.chdir(folder)
+                    sys.argv = ["vcam", *args, "-q"]
+                    code = _ended()
+                    if code:
+                        os._exit(code)
+                json.dump(list(sys.modules), names)
+            os._exit(0)
+        _, status = os.waitpid(process, 0)
+        assert not status, "a run or a sweep failed"
+        for name in json.loads((path / "names").read_text()):
+            with contextlib.suppress(ImportError):
+                importlib.import_module(name)
 
 
 if __name__ == "__main__":
