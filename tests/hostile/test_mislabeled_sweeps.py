@@ -9,11 +9,14 @@ import textwrap
 import pytest
 from making import long_except
 from sweeping import ROOT, environment, written
+from typer.testing import CliRunner
 
+from vcam_cli import sweep
+from vcam_cli.commands.main import app
 from vcam_cli.errors import BadInput, CannotDo
 from vcam_cli.files.folder import OutputFolder
 from vcam_cli.files.points_store import SweepFolder
-from vcam_cli.sweeps import sweep_file
+from vcam_cli.sweeps import sweep_file, sweep_points
 
 pytestmark = pytest.mark.attack("mislabeled rows of a sweep")
 SETS = {
@@ -144,28 +147,15 @@ def test_whole_sweeps_at_once(tmp_path, changes, same):
     """A sweep of a study that another process has in hand, or of another one."""
     first = written(tmp_path / "a")
     second = written(tmp_path / "b", **changes)
-    find = (
-        "import sys; from vcam_cli.sweeps import sweep_file, sweep_points;"
-        "print(sweep_points.grid(sweep_file.read(sys.argv[1])).hash)"
-    )
-    line = [sys.executable, "-c", find, str(first)]
-    known = subprocess.run(line, env=environment(), capture_output=True, text=True, check=True)
-    line = [sys.executable, "-m", "vcam_cli.commands.main", "sweep", str(second), "--workers", "1"]
-    with Holder(tmp_path / "out", known.stdout.strip()):
-        done = subprocess.run(
-            [*line, "--json", "-o", str(tmp_path / "out")],
-            env=environment(), capture_output=True, text=True,
-        )  # fmt: skip
-    assert done.returncode == (0 if same else 3), done
+    known = sweep_points.grid(sweep_file.read(first)).hash
+    with Holder(tmp_path / "out", known):
+        line = ["sweep", str(second), "--workers", "1", "--json", "-o", str(tmp_path / "out")]
+        done = CliRunner().invoke(app, line, prog_name="vcam")
+    assert done.exit_code == (0 if same else 3), done.output
     if same:
         assert json.loads(done.stdout)["computed"] == 3
     else:
         assert done.stderr.startswith("folder in use: another study")
-
-
-def call(*args: str, cwd) -> subprocess.CompletedProcess:
-    line = [sys.executable, "-m", "vcam_cli.commands.main", *args, "-q"]
-    return subprocess.run(line, cwd=cwd, env=environment(), capture_output=True, text=True)
 
 
 WRITING = [
@@ -178,15 +168,16 @@ WRITING = [
 @pytest.mark.parametrize(
     "command", long_except(WRITING[:2], WRITING), ids=[command[0] for command in WRITING]
 )
-def test_every_other_command_in_the_folder_of_a_sweep_at_work(command, tmp_path):
+def test_every_other_command_in_the_folder_of_a_sweep_at_work(command, tmp_path, monkeypatch):
     """It is refused before it computes, and the folder stays what it is."""
     oiio = pytest.importorskip("OpenImageIO")
     oiio.ImageBuf(oiio.ImageSpec(4, 4, 1, "uint8")).write(str(tmp_path / "gray.png"))
+    monkeypatch.chdir(tmp_path)
     out = tmp_path / "out"
     with Holder(out, STUDIES[0]):
         before = sorted(path.name for path in out.rglob("*"))
-        done = call(*command, "-o", "out", cwd=tmp_path)
-        assert done.returncode == 3, done
+        done = CliRunner().invoke(app, [*command, "-q", "-o", "out"], prog_name="vcam")
+        assert done.exit_code == 3, done.output
         assert done.stderr.startswith("folder in use: a sweep is writing out; wait for it")
         assert sorted(path.name for path in out.rglob("*")) == before
 
@@ -194,8 +185,10 @@ def test_every_other_command_in_the_folder_of_a_sweep_at_work(command, tmp_path)
 def test_a_sweep_in_the_folder_of_a_run_at_work(tmp_path):
     study = written(tmp_path / "a")
     with OutputFolder(tmp_path / "out"):
-        done = call("sweep", str(study), "-o", "out", cwd=tmp_path)
+        line = [sys.executable, "-m", "vcam_cli.commands.main", "sweep", str(study), "-q"]
+        done = subprocess.run(
+            [*line, "-o", "out"], cwd=tmp_path, env=environment(), capture_output=True, text=True
+        )
     assert done.returncode == 3, done
     assert done.stderr.startswith("folder in use: another run is writing out; wait for it")
-    done = call("sweep", str(study), "-o", "out", "--workers", "1", cwd=tmp_path)
-    assert done.returncode == 0, done
+    assert sweep(study, tmp_path / "out", workers=1).exit_code == 0
