@@ -186,10 +186,14 @@ def vcam(*args: str | Path):
     return CliRunner().invoke(main.app, [str(a) for a in args], prog_name="vcam")
 
 
-@pytest.mark.parametrize("name", list(schemas()))
+SCHEMAS = schemas()
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
 @pytest.mark.parametrize("way", ["a file", "a link", "an empty file", "a folder"])
 def test_a_schema_replaces_nothing(tmp_path, monkeypatch, name, way):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("vcam_cli.commands.schemas.schemas", lambda: SCHEMAS)
     (tmp_path / "mine").write_bytes(MINE)
     match way:
         case "a link":
