@@ -33,6 +33,7 @@ from vcam_cli.camera.sensor.adc import Adc
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES, article
 from vcam_cli.camera.sensor.array import Array
 from vcam_cli.camera.sensor.pixel import Pixel
+from vcam_cli.camera.sensor.several_readouts import ONE_READOUT
 from vcam_cli.camera.simulation import ACCURACY, Accuracy, Effects, Output, Seed
 from vcam_cli.config.model import FileModel, key
 from vcam_cli.config.validation_messages import failure, fault
@@ -164,7 +165,6 @@ class CameraModel(FileModel):
             yield fault(path, message, "write another array.pattern, or crosstalk: none")
         if given.interpixel_capacitance is None:
             return
-        several = bool(readout.gains) or readout.small is not None
         for refused, what, remedy in (
             (
                 self.array.summed_charges > 1,
@@ -172,7 +172,7 @@ class CameraModel(FileModel):
                 "write kind: digital in array.binning",
             ),
             (self.exposure.captures, "several captures of one integration", "give one time"),
-            (several, "several readouts of one exposure", "remove readout.gains and readout.small"),
+            (readout.has_several, "several readouts of one exposure", ONE_READOUT),
         ):
             if refused:
                 message = f"is not simulated with {what}"
@@ -183,12 +183,11 @@ class CameraModel(FileModel):
         if not self.pixel.blooming:
             return
         readout, array = self.pixel.readout, self.array
-        several = bool(readout.gains) or readout.small is not None
         for refused, what, remedy in (
             (array.is_scattered, "scattered pixels", "write another array.pattern"),
             (array.summed_charges > 1, "joined charges", "write kind: digital in array.binning"),
             (self.exposure.captures, "several captures of one integration", "give one time"),
-            (several, "several readouts of one exposure", "remove readout.gains and readout.small"),
+            (readout.has_several, "several readouts of one exposure", ONE_READOUT),
         ):
             if refused:
                 message = f"is not simulated with {what}"
@@ -216,13 +215,12 @@ class CameraModel(FileModel):
                 yield fault(("output", "phase"), message, "add pixel.phase_detection: dual")
             return
         scattered = array.is_scattered or array.pattern == "stacked"
-        several = bool(readout.gains) or readout.small is not None
         for refused, what, remedy in (
             (not self.optics.is_lens, "a bare sensor", "describe a lens in optics"),
             (scattered, "stacked or scattered pixels", "write another array.pattern"),
             (array.reads_several, "binned pixels", "remove array.binning"),
             (self.exposure.captures, "captures", "give one exposure time"),
-            (several, "several readouts", "remove readout.gains and readout.small"),
+            (readout.has_several, "several readouts", ONE_READOUT),
         ):
             if refused:
                 message = f"is not simulated with {what}"

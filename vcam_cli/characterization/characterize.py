@@ -14,7 +14,7 @@ from typing import Any
 from vcam_cli import backend
 from vcam_cli.backend import Processor
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.derived.readouts import has_several, readouts
+from vcam_cli.camera.derived.readouts import LARGE_PHOTODIODE, has_several, readouts
 from vcam_cli.camera.expectations import Limit
 from vcam_cli.characterization.bench import Bench, prepare_bench
 from vcam_cli.characterization.datasheet import COLUMNS, Quantity, notes, quantities
@@ -166,8 +166,11 @@ def _of_readouts(
     )
     names = ", ".join(readout.name for readout in each)
     told = [f"every readout is measured separately ({names}); plots show {each[0].name}"]
-    if camera.pixel.readout.small is not None:
-        told.append("small: photons are those on its own photodiode")
+    told += [
+        f"{readout.name}: photons are those on its own photodiode"
+        for readout in each
+        if readout.photodiode != LARGE_PHOTODIODE
+    ]
     for readout, part in zip(each, parts, strict=True):
         told += [f"{readout.name}: {note}" for note in part.notes]
     merged = measure_merged_snr(camera, workers, stages)

@@ -12,6 +12,7 @@ from itertools import accumulate
 from typing import Any
 
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.sensor.several_readouts import KEYS as SEVERAL_READOUTS
 from vcam_cli.effects.order import ORDER
 from vcam_cli.solve.settings import camera_settings
 
@@ -19,7 +20,7 @@ OTHER_KEYS = (
     *("name", "seed", "exposure", "processing", "quality", "output"),
     *("display.dpi", "display.width", "display.viewing_distance"),
     *("array.binning", "pixel.phase_detection", "pixel.readout.gain", "pixel.readout.timing"),
-    *(f"pixel.readout.{key}" for key in ("gains", "merge", "small")),
+    *(f"pixel.readout.{key}" for key in SEVERAL_READOUTS),
 )
 """Keys behind the light that belong to no effect. Exposure, ADC and analog gain set the level at
 which a pixel is full, beyond which the light is not followed as exactly: see `RateCache.rate`."""

@@ -36,8 +36,7 @@ class Readout:
 
 def has_several(camera: Camera) -> bool:
     """Return whether a camera reads its pixels more than once in an exposure."""
-    given = camera.pixel.readout
-    return bool(given.gains) or given.small is not None
+    return camera.pixel.readout.has_several
 
 
 def readouts(camera: Camera) -> tuple[Readout, ...]:

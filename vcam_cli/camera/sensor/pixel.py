@@ -206,9 +206,14 @@ class Readout(Model):
             if isinstance(noise, NoiseTable)
         }
 
+    @property
+    def has_several(self) -> bool:
+        """Whether a pixel is read more than once in an exposure."""
+        return bool(self.gains) or self.small is not None
+
     @model_validator(mode="after")
     def _check_agreement(self) -> Self:
-        if self.merge == "switch" and not self.gains and self.small is None:
+        if self.merge == "switch" and not self.has_several:
             message = "needs several readouts; this camera has one"
             raise refusal(("merge",), message, "add gains: [1, 8], or remove merge")
         g, v, well = self.conversion_gain, self.voltage_swing, self.full_well
