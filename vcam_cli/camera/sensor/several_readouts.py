@@ -12,7 +12,7 @@ from vcam_cli.config.values import Either, Electrons
 KEYS = ("gains", "small", "merge")
 """Keys of `pixel.readout` that read a pixel several times in one exposure."""
 ONE_READOUT = "remove readout.gains and readout.small"
-"""Remedy for what is simulated of pixels alone that are read once in an exposure."""
+"""Remedy where an effect needs pixels that are read once in an exposure."""
 _GAIN = Number(above=0, most=1e6, example="8")
 
 
