@@ -188,6 +188,15 @@ EXAMPLES = {
         "0.3 s of 2 nA/cm2: the processing subtracts the mean, and not the noise, nor how pixels"
         " differ.",
     ),
+    "smear": Example(
+        (
+            "scene.source={kind: chart, chart: hdr-patches, dynamic_range: 100, lamp: 1000}",
+            "exposure.time=1 ms",
+            "pixel.readout.charge_transfer={inefficiency: 0, smear: 0.2 %}",
+        ),
+        "A CCD that moves charge through the light: a lamp of a thousand times white draws a line.",
+        "kai-02170",
+    ),
     "charge_transfer": Example(
         (*_chart("eye-chart"), "pixel.readout.charge_transfer={inefficiency: 5e-3, phases: 3}"),
         "A CCD that leaves 0.5 % of a packet behind at every step: smear away from the amplifier.",

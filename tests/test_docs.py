@@ -30,7 +30,7 @@ FACTS = {
     "commands.html#exit-codes",
     "effects.html#dark_current",
     "metrics.html#snr_db",
-    "not-simulated.html#smear",
+    "not-simulated.html#flash",
     "words.html#system_gain",
     "words.html#saturation_capacity",
 }

@@ -312,7 +312,7 @@ def test_what_is_not_simulated_is_said(word):
 
 @pytest.mark.parametrize(
     "guess",
-    ["pixel.readout.smear=5 %", "array.smear=5 %", "effects.smear=on"],
+    ["scene.flash=on", "array.flash=1", "effects.flash=on"],
 )
 def test_what_is_not_simulated_is_said_wherever_it_is_looked_for(guess):
     assert "not simulated" in remedy_of(guess)[0]

@@ -90,8 +90,8 @@ def test_the_models_of_a_picture_are_listed():
 
 
 def test_what_is_not_simulated_is_told():
-    assert vcam("smear").stdout.startswith(
-        "smear (not simulated)\n  Charge transfer is instantaneous"
+    assert vcam("flash").stdout.startswith(
+        "flash (not simulated)\n  Scene.illuminant has one level throughout the exposure"
     )
 
 

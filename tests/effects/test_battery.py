@@ -26,6 +26,7 @@ from vcam_cli.effects.optics.depth import Depth
 from vcam_cli.effects.order import ORDER
 from vcam_cli.effects.pixel_signal import (
     Charge,
+    ColumnSpread,
     Gain,
     NeighborSharing,
     Overflow,
@@ -155,6 +156,11 @@ CASES: dict[str, Case] = {
     "dark_current": Case(
         {"pixel.photodetector.dark_current": "5 ke/s"},
         {"pixel.photodetector.dark_current": "0 e/s"},
+    ),
+    "smear": Case(
+        {"pixel.architecture": "ccd", "pixel.readout.charge_transfer": {"smear": "1 %"}},
+        {"pixel.architecture": "ccd", "pixel.readout.charge_transfer": {"smear": "0 %"}},
+        {"scene.source": WAVE | {"orientation": "90 deg"}},
     ),
     "charge_transfer": Case(
         {"pixel.architecture": "ccd", "pixel.readout.charge_transfer": {"inefficiency": 1e-3}},
@@ -586,6 +592,10 @@ def test_finite_on_hostile_input(kind, dtype, tmp_path):
         assert 0 < effect.fraction <= 1
     elif isinstance(effect, Overflow):
         results = [effect.settled(np.array([[-1e9, 0], [1e-30, 0.5], [1e6, 1e12]], dtype))]
+    elif isinstance(effect, ColumnSpread):
+        signal = np.array([[-1e9, 0], [1e-30, 0.5], [1e6, 1e12]], dtype)
+        results = [effect.spread(signal)]
+        assert results[0].dtype == dtype
     elif isinstance(effect, NeighborSharing):
         signal = np.array([[-1e9, 0], [1e-30, 0.5], [1e6, 1e12]], dtype)
         kernels = [np.array(k.points[0][1])[None] for k in effect.before]

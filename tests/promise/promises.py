@@ -271,7 +271,7 @@ pixel:
   architecture: ccd
   stack: {passivation: {thickness: 0.5 um, index: 2.0}, oxide: {thickness: 3 um, index: 1.46}}
   microlens: {gain: 1.6, shift: optimal}
-  readout: {charge_transfer: {inefficiency: 1e-4, phases: 3}, reset_noise: ktc}
+  readout: {charge_transfer: {inefficiency: 1e-4, phases: 3, smear: 0.5 %}, reset_noise: ktc}
   photodetector: {capacitance: 5 fF, dark_current: 500 e/s}
   fpn: {dark: 30 %, offset_pixel: 2 e}
 array: {rows: 60, columns: 80, pattern: bayer-rggb}

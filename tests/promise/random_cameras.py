@@ -71,7 +71,9 @@ def tree(number: int) -> dict:
     ccd = number % 2 == 0  # it samples twice, and has no reset noise
     noise: dict = {"reset_noise": spread(0.3, 30, "e")}
     if ccd:
-        noise = {"charge_transfer": {"inefficiency": spread(1e-6, 1e-3), "phases": 3}}
+        leak = spread(0.01, 1, "%")
+        transfer = {"inefficiency": spread(1e-6, 1e-3), "phases": 3, "smear": leak}
+        noise = {"charge_transfer": transfer}
     drawn = {
         "name": f"random-{number}",
         "scene": scene,

@@ -51,9 +51,9 @@ def test_nobody_asks_for_nothing_is_done(case):
 @pytest.mark.parametrize(
     ("number", "absent"),
     [
-        (1, {"charge_transfer", "flicker", "motion", "depth"}),
+        (1, {"charge_transfer", "smear", "flicker", "motion", "depth"}),
         (4, {"reset_noise", "flicker", "motion", "depth"}),
-        (7, {"charge_transfer", "flicker", "depth"}),
+        (7, {"charge_transfer", "smear", "flicker", "depth"}),
         (8, {"reset_noise", "motion"}),
     ],
 )

@@ -96,7 +96,7 @@ CAMERAS = {
         "optics.stray_light": 0.03,
         "scene.camera_motion": {"jitter": "0.3 px"},
         "pixel.architecture": "ccd",
-        "pixel.readout.charge_transfer": {"inefficiency": 2e-4},
+        "pixel.readout.charge_transfer": {"inefficiency": 2e-4, "smear": "1 %"},
         "pixel.readout.row_noise": "3 e",
         "pixel.readout.heavy_tailed_noise": {"rms": "40 e"},
         "pixel.readout.correlated_row_noise": {"rms": "40 e"},

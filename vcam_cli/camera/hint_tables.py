@@ -84,6 +84,7 @@ KEYS: Mapping[str, str] = {
     "full_well_capacity": "pixel.readout.full_well: 20 ke",
     "saturation_capacity": "pixel.readout.full_well: 20 ke",
     "cte": "pixel.readout.charge_transfer: {inefficiency: 3e-5, phases: 3}",
+    **dict.fromkeys(("smear", "frame_shift"), "pixel.readout.charge_transfer: {smear: 0.01 %}"),
     "cti": "pixel.readout.charge_transfer: {inefficiency: 3e-5, phases: 3}",
     **dict.fromkeys(("crosstalk", "optical_crosstalk"), "pixel.crosstalk: {optical: 1 %}"),
     **dict.fromkeys(("pdaf", "dual_pixel"), "pixel.phase_detection: dual"),
@@ -333,7 +334,6 @@ SWITCHES = {
 }
 """A word for a switch -> what it means."""
 NOT_SIMULATED: Mapping[str, str] = {
-    "smear": "charge transfer is instantaneous",
     "flash": "scene.illuminant has one level throughout the exposure",
     **dict.fromkeys(
         ("stabilization", "image_stabilization", "optical_stabilization"),

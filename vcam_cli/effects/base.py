@@ -14,6 +14,7 @@ kind says in mathematics what it does, and so where in the order it acts (`order
     VeilingGlare       spreads part of the light over the whole sensor          no unit
     TemporalGain       multiplies the signal by the light of each line's time   no unit
     NeighborSharing    gives part of a pixel's signal to its neighbors          no unit
+    ColumnSpread       spreads part of a column's light over the column         no unit
     Overflow           moves charge that wells do not hold                      electrons
     Charge             adds electrons                                           electrons
     Transport          moves charge to later pixels on its way out              no unit

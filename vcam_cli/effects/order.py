@@ -15,6 +15,7 @@
     electrons / s          Gain               pixel_vignetting, microlens    electrons / s
     electrons / s          TemporalGain       flicker                        electrons / s
     electrons / s          NeighborSharing    crosstalk                      electrons / s
+    electrons / s          ColumnSpread       smear                          electrons / s
     electrons / s          Charge             dark_current                   electrons (mean signal)
     electrons              Transport          charge_transfer                electrons (mean signal)
     electrons              before_shot        fpn, fpn_maps                  electrons (mean signal)
@@ -64,6 +65,7 @@ from vcam_cli.effects.pixel.microlens import Microlens
 from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
 from vcam_cli.effects.pixel.pixel_vignetting import PixelVignetting
 from vcam_cli.effects.pixel.saturation import Saturation
+from vcam_cli.effects.pixel.smear import Smear
 from vcam_cli.effects.temporal.flicker import Flicker
 from vcam_cli.effects.temporal.jitter import Jitter
 from vcam_cli.effects.temporal.motion import Motion
@@ -85,6 +87,7 @@ ORDER: tuple[type[Effect], ...] = (
     Microlens,
     Flicker,
     Crosstalk,
+    Smear,
     DarkCurrent,
     ChargeTransfer,
     *SOURCES,

@@ -11,6 +11,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.camera.sensor.crosstalk import Kernel, Kernels
 from vcam_cli.effects.base import Effect
 
@@ -110,6 +111,46 @@ class NeighborSharing(Effect):
     """Of the charge that is counted: neighbors show the same noise."""
     largest_share: float
     """Largest share of a pixel's signal that it gives away."""
+
+
+class ColumnSpread(Effect):
+    """Light that is caught by charge on its way along the column, whatever wells hold."""
+
+    acts_on_light = False
+    share: float
+    """Share of the light on a column."""
+
+    @abstractmethod
+    def spread(self, light: Array) -> Array:
+        """Return the light with part of it spread over its column.
+
+        Parameters
+        ----------
+        light : Array
+            Mean rates (..., rows, columns) [e/s].
+
+        Returns
+        -------
+        Array
+            Rates in the shape and float type of the light [e/s].
+        """
+
+    @abstractmethod
+    def color_matrix(self, mosaic: Mosaic, planes: bool) -> Array:
+        """Return what even light of several colors becomes.
+
+        Parameters
+        ----------
+        mosaic : Mosaic
+            Colors of the pixels, C in all.
+        planes : bool
+            Whether every pixel has every color.
+
+        Returns
+        -------
+        Array
+            Share (C, C) of the light of each color in the signal of each.
+        """
 
 
 class Overflow(Effect):

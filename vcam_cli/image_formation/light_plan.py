@@ -19,7 +19,13 @@ import numpy as np
 from vcam_cli.effects.base import Effect, SignalLevels, of_kind
 from vcam_cli.effects.blurs import Blur, FieldTransfer, SeparableTransfer
 from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
-from vcam_cli.effects.pixel_signal import Gain, NeighborSharing, Transport, VeilingGlare
+from vcam_cli.effects.pixel_signal import (
+    ColumnSpread,
+    Gain,
+    NeighborSharing,
+    Transport,
+    VeilingGlare,
+)
 from vcam_cli.effects.warps import StillWarp, Warp
 from vcam_cli.image_formation.estimates.edge_changes import exact_changes, has_straight_edges
 from vcam_cli.image_formation.estimates.light_cost import LightCost
@@ -42,7 +48,7 @@ PLACES = 33
 """Places along each side of the array at which a gain, which is smooth, is looked at."""
 BLURS = (Blur, SeparableTransfer, FieldTransfer, Warp)
 """Kinds of effects that blur the light, or displace it."""
-KINDS = (*BLURS, Gain, VeilingGlare, NeighborSharing, Transport)
+KINDS = (*BLURS, Gain, VeilingGlare, NeighborSharing, ColumnSpread, Transport)
 """Kinds of effects on the light, and on the charge that it makes."""
 EXACT = 10e-3
 """Time that exact sums take of what a blur changes of edges [s]: one that saves less is kept
@@ -192,6 +198,12 @@ def _share(path: OpticalPath, scene: AnyScene, effect: Effect) -> float:
     if shared and len(path.mosaic.colors) > 1:  # of even light, too, each color changes others
         return math.inf
     spread += [sharing.largest_share for sharing in shared]
+    columns = of_kind([effect], ColumnSpread)
+    # What wells do not hold smears, too: where light is beyond them, or their time is not known.
+    brightest = _range_of_light(scene)[1] * float(path.transfer.level.sum(axis=0).max())
+    if columns and (len(path.mosaic.colors) > 1 or not brightest < path.ceiling < math.inf):
+        return math.inf
+    spread += [smear.share for smear in columns]
     for fraction in spread:
         before = path.effects[: path.effects.index(effect)]
         low, high = _range_of_gains(path, of_kind(before, Gain))

@@ -12,7 +12,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.effects.base import Effect, SignalLevels, of_kind
-from vcam_cli.effects.pixel_signal import NeighborSharing, TemporalGain, Transport
+from vcam_cli.effects.pixel_signal import ColumnSpread, NeighborSharing, TemporalGain, Transport
 from vcam_cli.effects.signal_chain import Limit, NoiseSource, extreme_signal
 from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.floats import rms
@@ -82,13 +82,17 @@ def expose(seen: SceneLight, light: photon_rate.Rate) -> ExposedLight:
         *(layout.mosaic, layout.planes),
     )
     white_rate = seen.white_rate * groups.summed_charges / (light.plan.on_axis or 1.0)
+    smears = of_kind(effects, ColumnSpread)
     if sharing is not None:
         white_rate = sharing.matrix @ white_rate
+    for smear in smears:
+        white_rate = smear.color_matrix(layout.mosaic, layout.planes) @ white_rate
     white = float(white_rate.max())
     dark = exposure.mean_dark(1.0, enabled)
     pixel_dark = dark / groups.summed_charges
     made = layout.select_pixels(light.values)
-    collected = made if sharing is None else sharing.arriving(made)
+    shared = made if sharing is None else sharing.arriving(made)
+    collected = _smeared(shared, smears)
     rate = groups.collect(_transported(collected, pixel_dark, effects))
     asked = solved.limited_exposure
     times = sample_times.choose_sample_times(asked, rate, solved.chain)
@@ -109,7 +113,7 @@ def expose(seen: SceneLight, light: photon_rate.Rate) -> ExposedLight:
         if values is light.values:
             return collected
         selected = layout.select_pixels(values)
-        return selected if sharing is None else sharing.arriving(selected)
+        return _smeared(selected if sharing is None else sharing.arriving(selected), smears)
 
     def collect(values: Array, start: float, stop: float) -> Array:
         lit = select(values, start, stop)
@@ -146,8 +150,9 @@ def expose(seen: SceneLight, light: photon_rate.Rate) -> ExposedLight:
         without = timed_gains.apply(light.values, others, layout.lattice, 0.0, time)
         changes[effect.name] = rms(np.subtract(lit, without))
     if sharing is not None:
-        [shared] = of_kind(effects, NeighborSharing)
-        changes[shared.name] = rms(np.subtract(sharing.coupled(collected), made))
+        [giving] = of_kind(effects, NeighborSharing)
+        changes[giving.name] = rms(np.subtract(sharing.coupled(shared), made))
+    changes |= dict.fromkeys((s.name for s in smears), rms(np.subtract(collected, shared)))
     if transports := [transport.name for transport in of_kind(enabled, Transport)]:
         well = min(circuit.full_well / time - dark, MOST_ELECTRONS)
         most = well if full_charge is None else full_charge / time - dark
@@ -205,6 +210,13 @@ def _pixel_changes(
         changes = pixelwise.changes_by_omission(plane, geometry, colors, present, running, time)
         largest = {name: max(change, largest.get(name, 0.0)) for name, change in changes.items()}
     return largest
+
+
+def _smeared(light: Array, smears: Sequence[ColumnSpread]) -> Array:
+    """Return the light of pixels (..., rows, columns) with what packets catch of it [e/s]."""
+    for smear in smears:
+        light = smear.spread(light)
+    return light
 
 
 def _transported(

@@ -13,7 +13,8 @@ from vcam_cli.camera.processing import SHOWN
 from vcam_cli.camera.scene.scene_files import ImageFile
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES
 from vcam_cli.effects.base import of_kind
-from vcam_cli.effects.readout_chain import SIGMAS
+from vcam_cli.effects.pixel_signal import ColumnSpread, Overflow
+from vcam_cli.effects.signal_chain import SIGMAS
 from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.floats import own_float_errors
 from vcam_cli.image_formation.light_plan import BLURS
@@ -294,7 +295,9 @@ def _unused_codes(ready: Prepared) -> tuple[str, ...]:
 
 
 def _overflow(ready: Prepared) -> tuple[str, ...]:
-    """Return where charge goes that wells do not hold; no blooming or smear is simulated."""
+    """Return where charge goes that wells do not hold, unless it spills."""
+    if of_kind(ready.plan.active, Overflow):
+        return ()
     well, rate = ready.electrical.full_well, ready.rate.reshape(-1)
     dark, time = ready.dark_rate * ready.exposure_time, ready.exposure_time
     if float(rate.max(initial=0.0)) * time + dark <= well:
@@ -305,11 +308,10 @@ def _overflow(ready: Prepared) -> tuple[str, ...]:
     if share < VISIBLE_OVERFLOW:
         return ()
     ccd = ARCHITECTURES[ready.solved.pixel.architecture].transfers
-    smear = ", and neither is smear" if ccd else ""
-    return (
-        f"excess charge, {share:.3g} times the capacity of all wells, is discarded: blooming is"
-        f" not simulated{smear}",
-    )
+    said = "give pixel.blooming to let it spill along columns"
+    if ccd and not of_kind(ready.plan.active, ColumnSpread):
+        said += ", and charge_transfer.smear for light on charge that moves"
+    return (f"excess charge, {share:.3g} times the capacity of all wells, is discarded; {said}",)
 
 
 def _far_overexposed(ready: Prepared) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from functools import partial
 from vcam_cli import memory
 from vcam_cli.arrays import Array
 from vcam_cli.effects.base import Effect, of_kind
-from vcam_cli.effects.pixel_signal import NeighborSharing, TemporalGain, Transport
+from vcam_cli.effects.pixel_signal import ColumnSpread, NeighborSharing, TemporalGain, Transport
 from vcam_cli.effects.signal_chain import SIGMAS, NoiseSource, full_well
 from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.errors import bad
@@ -221,7 +221,7 @@ def _fullness(solved: Solved, scene: AnyScene, white_rate: float) -> float:
     well = full_well(enabled)
     # Of full packets that are transferred, too, some charge is late; and the least light of the
     # color with least of it is not that of pixels that share it.
-    shared = of_kind(enabled, TemporalGain, NeighborSharing, Transport)
+    shared = of_kind(enabled, TemporalGain, NeighborSharing, ColumnSpread, Transport)
     joined = solved.binning is not None or shared
     if time is None or joined or math.isinf(well) or not isinstance(scene, ChartScene | WaveScene):
         return 0.0

@@ -32,7 +32,7 @@ from vcam_cli.camera.sensor.array import Binning
 from vcam_cli.camera.sensor.pixel import Pixel
 from vcam_cli.camera.simulation import Output, Seed
 from vcam_cli.effects.base import of_kind
-from vcam_cli.effects.pixel_signal import Gain, NeighborSharing
+from vcam_cli.effects.pixel_signal import ColumnSpread, Gain, NeighborSharing
 from vcam_cli.effects.readout_chain import dark_noise, electrical
 from vcam_cli.effects.signal_chain import Quantizer
 from vcam_cli.image_formation.neighbor_sharing import array_sharing
@@ -254,7 +254,10 @@ class Solved:
             *(of_kind(self.effects.enabled, NeighborSharing), self.response, light),
             *(self.layout.mosaic, self.layout.planes),
         )
-        return found if sharing is None else sharing.matrix @ found
+        found = found if sharing is None else sharing.matrix @ found
+        for smear in of_kind(self.effects.enabled, ColumnSpread):
+            found = smear.color_matrix(self.layout.mosaic, self.layout.planes) @ found
+        return found
 
     # --- the same camera with other values -----------------------------------------------------
 

@@ -22,7 +22,7 @@ from vcam_cli.camera.sensor.several_readouts import GAINS, SmallPhotodiode
 from vcam_cli.camera.sensor.technology import CHOICE, TechnologyChoice
 from vcam_cli.camera.sensor.transfer_curve import TransferCurve
 from vcam_cli.config.model import Model, at_most_one, exactly_one, key
-from vcam_cli.config.quantities import Number, Quantity, Whole
+from vcam_cli.config.quantities import Number, Percentage, Quantity, Whole
 from vcam_cli.config.validation_messages import fault, refusal
 from vcam_cli.config.values import (
     MOST_ELECTRONS,
@@ -55,6 +55,13 @@ class ChargeTransfer(Model):
         "charge left behind at a stage", example=3e-5, default=3e-5
     )
     phases: Annotated[int, Whole(least=1, most=8, example="3")] = key("stages per pixel", default=3)
+    smear: Annotated[float, Percentage(least=0, below=1, example="0.01 %")] = key(
+        "share of the light on a column that falls on charge on its way and is spread over the"
+        " column: transfer time over exposure and transfer time of a frame-transfer ccd; of an"
+        " interline ccd ten times the smear of data sheets, of light on a tenth of the rows",
+        example="0.01 %",
+        default=0.0,
+    )
 
 
 class Timing(Model):
