@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from vcam_cli.arrays import Array
     from vcam_cli.camera.camera import Camera
 
 ENLARGED = 2
@@ -20,6 +21,8 @@ GAP = 4
 """Columns between the photographs."""
 SIZE = ("array.rows=120", "array.columns=160")
 GRAY = ("array.pattern=monochrome", "processing=[black_level: subtract, gamma: srgb]")
+FPS = 25
+"""Frames a second of sequences."""
 ABSOLUTE = "processing=[black_level: subtract, tone: {white: sensor}, gamma: srgb]"
 """Brightness is the share of the full well, and not of the scene's white."""
 DIM = ("scene.luminance=4 cd/m2", "exposure.time=15 ms", "adc.full_scale=20 mV")
@@ -43,6 +46,8 @@ class Example:
     camera: str = "starter"
     without: tuple[str, ...] = ()
     """What is changed instead for the photograph at the left; () where the effect is left out."""
+    frames: int = 1
+    """The photograph is the last of so many frames, at `FPS`."""
 
 
 def _chart(name: str) -> tuple[str, ...]:
@@ -188,6 +193,18 @@ EXAMPLES = {
         "0.3 s of 2 nA/cm2: the processing subtracts the mean, and not the noise, nor how pixels"
         " differ.",
     ),
+    "lag": Example(
+        (
+            *_chart("eye-chart"),
+            *GRAY,
+            "scene.source.motion={x: 0.8 m/s}",
+            "pixel.lag=40 %",
+            "exposure.time=5 ms",
+        ),
+        "A chart in motion, the fifth frame of a sequence: 40 % of the charge is read one frame"
+        " later.",
+        frames=5,
+    ),
     "smear": Example(
         (
             "scene.source={kind: chart, chart: hdr-patches, dynamic_range: 100, lamp: 1000}",
@@ -256,7 +273,8 @@ def command(name: str) -> str:
     """Return the command that takes the photograph with an effect."""
     example = EXAMPLES[name]
     sets = "".join(f' \\\n    --set "{given}"' for given in (*SIZE, *example.sets))
-    return f"vcam run {example.camera} -o out/{name}{sets}"
+    several = f" --frames {example.frames} --fps {FPS}" if example.frames > 1 else ""
+    return f"vcam run {example.camera} -o out/{name}{several}{sets}"
 
 
 def cameras(name: str) -> tuple[Camera, Camera]:
@@ -269,14 +287,26 @@ def cameras(name: str) -> tuple[Camera, Camera]:
     return load(example.camera, (*sets, *left)), load(example.camera, (*sets, *right))
 
 
+def photograph(name: str, camera: Camera) -> Array:
+    """Return the photograph of an effect's camera (rows, columns[, 3])."""
+    from vcam_cli import simulate
+    from vcam_cli.progress import observer
+    from vcam_cli.simulation.sequence import frames
+
+    count = EXAMPLES[name].frames
+    if count == 1:
+        return simulate(camera).render
+    *_, (_, last) = frames(camera, count, FPS, None, observer(None))
+    return last.render
+
+
 def draw(name: str, file: Path) -> None:
     """Write both photographs of an effect side by side, without it at the left, as a PNG."""
     import numpy as np
 
-    from vcam_cli import simulate
     from vcam_cli.files.images.png import write_png
 
-    images = [np.atleast_3d(simulate(camera).render) for camera in cameras(name)]
+    images = [np.atleast_3d(photograph(name, camera)) for camera in cameras(name)]
     pair = [np.kron(each, np.ones((ENLARGED, ENLARGED, 1), np.uint8)) for each in images]
     gap = np.full((pair[0].shape[0], GAP * ENLARGED, pair[0].shape[2]), 255, np.uint8)
     both = np.concatenate([pair[0], gap, pair[1]], axis=1)

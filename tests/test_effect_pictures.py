@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from scripts import effect_pictures
-from vcam_cli import simulate
 from vcam_cli.commands.explain import explanations
 from vcam_cli.effects.order import ORDER
 
@@ -31,7 +30,10 @@ def test_both_cameras_of_a_picture_differ_in_the_effect_alone(name):
 @pytest.mark.parametrize("name", NAMES)
 def test_the_effect_is_seen(name):
     """The photographs differ by 2 % of white rms, at least."""
-    pair = [simulate(camera).render.astype(float) for camera in effect_pictures.cameras(name)]
+    pair = [
+        effect_pictures.photograph(name, camera).astype(float)
+        for camera in effect_pictures.cameras(name)
+    ]
     assert np.sqrt(np.mean((pair[0] - pair[1]) ** 2)) > 0.02 * 255
 
 

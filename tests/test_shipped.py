@@ -146,16 +146,8 @@ def test_everything_has_every_effect_of_its_architecture():
     described = camera_effects(camera, geometry(camera)).found
     missing = {name for name, effect in described.items() if effect is None}
     assert missing == {
-        *(
-            "charge_transfer",
-            "smear",
-            "reset_noise",
-            "depth",
-            "adc_noise",
-            "distortion",
-            "lateral_color",
-        ),
-        *("crosstalk", "jitter", "blooming", "low_pass", "fpn_maps"),
+        *("charge_transfer", "smear", "reset_noise", "depth", "adc_noise", "distortion", "lag"),
+        *("crosstalk", "jitter", "blooming", "low_pass", "fpn_maps", "lateral_color"),
     }
     assert camera.effects == "auto"
 

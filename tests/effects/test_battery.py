@@ -30,6 +30,7 @@ from vcam_cli.effects.pixel_signal import (
     Gain,
     NeighborSharing,
     Overflow,
+    Retention,
     TemporalGain,
     Transport,
     VeilingGlare,
@@ -157,6 +158,7 @@ CASES: dict[str, Case] = {
         {"pixel.photodetector.dark_current": "5 ke/s"},
         {"pixel.photodetector.dark_current": "0 e/s"},
     ),
+    "lag": Case({"pixel.lag": "5 %"}, {"pixel.lag": "0 %"}),
     "smear": Case(
         {"pixel.architecture": "ccd", "pixel.readout.charge_transfer": {"smear": "1 %"}},
         {"pixel.architecture": "ccd", "pixel.readout.charge_transfer": {"smear": "0 %"}},
@@ -286,15 +288,22 @@ def test_switched_off_is_zero_strength_and_on_is_not(kind, tmp_path):
     """`off` and a file that gives it no strength are the same bytes; `on` shows in the signal."""
     case = CASES[kind.name]
     scene = case.has | case.shows
-    on = simulate(camera(tmp_path, scene))
-    off = simulate(camera(tmp_path, scene | {"effects": {kind.name: "off"}}))
+
+    def shot(changes):
+        made = camera(tmp_path, changes)
+        if issubclass(kind, Retention):  # it shows behind another frame
+            return simulate(made, before=simulate(made.with_({"exposure.time": "5 ms"})))
+        return simulate(made)
+
+    on = shot(scene)
+    off = shot(scene | {"effects": {kind.name: "off"}})
     if issubclass(kind, NoiseSource) and kind.behind_well:  # behind the electrons
         assert on.electrons.tobytes() == off.electrons.tobytes()
         assert on.dn.tobytes() != off.dn.tobytes()
     elif not issubclass(kind, Quantizer):  # the ADC makes codes, and leaves electrons alone
         assert on.electrons.tobytes() != off.electrons.tobytes()
     if case.none is not None:
-        none = simulate(camera(tmp_path, scene | case.none))
+        none = shot(scene | case.none)
         assert none.electrons.tobytes() == off.electrons.tobytes()
         assert none.mean_electrons.tobytes() == off.mean_electrons.tobytes()
         assert none.dn.tobytes() == off.dn.tobytes()
@@ -592,6 +601,8 @@ def test_finite_on_hostile_input(kind, dtype, tmp_path):
         assert 0 < effect.fraction <= 1
     elif isinstance(effect, Overflow):
         results = [effect.settled(np.array([[-1e9, 0], [1e-30, 0.5], [1e6, 1e12]], dtype))]
+    elif isinstance(effect, Retention):
+        results = [np.array(effect.share)]
     elif isinstance(effect, ColumnSpread):
         signal = np.array([[-1e9, 0], [1e-30, 0.5], [1e6, 1e12]], dtype)
         results = [effect.spread(signal)]

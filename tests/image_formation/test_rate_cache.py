@@ -40,6 +40,7 @@ CHANGES = {
     "pixel.defects": {"hot": 0.01, "dead": 0.01},
     "pixel.crosstalk": {"optical": "1 %"},
     "pixel.blooming": "10 %",
+    "pixel.lag": "5 %",
     "pixel.readout.gain": 2,
     "pixel.readout.read_noise": "9 e",
     "pixel.readout.column_noise": "9 e",

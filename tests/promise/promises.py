@@ -268,6 +268,7 @@ exposure: {auto: {max: 100 ms}}
 scene: {source: {kind: chart, chart: colorchecker}}
 optics: {f_number: 2.8, exit_pupil_distance: 3 mm}
 pixel:
+  lag: 2 %
   architecture: ccd
   stack: {passivation: {thickness: 0.5 um, index: 2.0}, oxide: {thickness: 3 um, index: 1.46}}
   microlens: {gain: 1.6, shift: optimal}

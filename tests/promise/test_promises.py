@@ -63,7 +63,13 @@ def test_random_cameras_keep_every_tolerance(number, absent, tmp_path):
     Of a picture in laser light, which has no lamp, no lamp flickers.
     """
     camera = random_cameras.made(number, tmp_path)
-    absent |= {"distortion", "lateral_color", "jitter", "blooming"}  # of `promises.CAMERAS` alone
+    absent |= {
+        "distortion",
+        "lateral_color",
+        "jitter",
+        "blooming",
+        "lag",
+    }  # of `promises.CAMERAS` alone
     assert absent == {kind.name for kind in ORDER} - set(ablation.wanted_effects(camera))
     for found in random_cameras.held(camera):
         assert found.mean <= found.tolerance, found

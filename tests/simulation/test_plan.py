@@ -110,6 +110,7 @@ CAMERAS = {
         "pixel.defects": {"hot": 0.01, "hot_current": 200, "dead": 0.02},
         "pixel.crosstalk": {"optical": "0.5 %", "interpixel_capacitance": "0.4 %"},
         "pixel.blooming": "10 %",
+        "pixel.lag": "5 %",
         "pixel.microlens": {"gain": 1.5},
         "pixel.stack": {
             "passivation": {"thickness": "0.7 um", "index": 2.0},

@@ -84,6 +84,7 @@ KEYS: Mapping[str, str] = {
     "full_well_capacity": "pixel.readout.full_well: 20 ke",
     "saturation_capacity": "pixel.readout.full_well: 20 ke",
     "cte": "pixel.readout.charge_transfer: {inefficiency: 3e-5, phases: 3}",
+    **dict.fromkeys(("image_lag", "ghosting", "persistence"), "pixel.lag: 2 %"),
     **dict.fromkeys(("smear", "frame_shift"), "pixel.readout.charge_transfer: {smear: 0.01 %}"),
     "cti": "pixel.readout.charge_transfer: {inefficiency: 3e-5, phases: 3}",
     **dict.fromkeys(("crosstalk", "optical_crosstalk"), "pixel.crosstalk: {optical: 1 %}"),

@@ -115,6 +115,7 @@ class CameraModel(FileModel):
             *self._phase_mistakes(),
             *self._blooming_mistakes(),
             *self._map_mistakes(),
+            *self._lag_mistakes(),
             *unmeasured_mistakes(
                 self.expect, self.quality, self.has_edge, self.exposure.has_samples
             ),
@@ -192,6 +193,20 @@ class CameraModel(FileModel):
             if refused:
                 message = f"is not simulated with {what}"
                 yield fault(("pixel", "blooming"), message, f"{remedy}, or blooming: 0 %")
+
+    def _lag_mistakes(self) -> Iterator[InitErrorDetails]:
+        """Yield why lag of these pixels cannot be simulated."""
+        readout, exposure = self.pixel.readout, self.exposure
+        several = bool(readout.gains) or readout.small is not None
+        for refused, what, remedy in (
+            (exposure.captures, "several captures of one integration", "give one time"),
+            (exposure.bracket, "a bracket", "give one time"),
+            (several, "several readouts of one exposure", "remove readout.gains and readout.small"),
+            (self.pixel.phase_detection, "phase detection", "remove phase_detection"),
+        ):
+            if self.pixel.lag and refused:
+                message = f"is not simulated with {what}"
+                yield fault(("pixel", "lag"), message, f"{remedy}, or write lag: 0 %")
 
     def _map_mistakes(self) -> Iterator[InitErrorDetails]:
         """Yield why pixels cannot have a fixed pattern from files."""

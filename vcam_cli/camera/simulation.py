@@ -42,6 +42,7 @@ EFFECTS = {
     "saturation": "a pixel clips at its full-well capacity",
     "adc_noise": "noise of the ADC, behind the gain",
     "quantization": "rounding to the ADC's codes",
+    "lag": "charge that is read in the next frame",
     "smear": "light on charge that a ccd moves along the column",
     "charge_transfer": "charge transfer inefficiency of a ccd",
 }

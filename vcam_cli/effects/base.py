@@ -17,6 +17,7 @@ kind says in mathematics what it does, and so where in the order it acts (`order
     ColumnSpread       spreads part of a column's light over the column         no unit
     Overflow           moves charge that wells do not hold                      electrons
     Charge             adds electrons                                           electrons
+    Retention          keeps part of a pixel's charge for the next frame        no unit
     Transport          moves charge to later pixels on its way out              no unit
     NoiseSource        adds randomness, of known variance                       electrons
     Limit              clamps                                                   electrons

@@ -17,6 +17,7 @@
     electrons / s          NeighborSharing    crosstalk                      electrons / s
     electrons / s          ColumnSpread       smear                          electrons / s
     electrons / s          Charge             dark_current                   electrons (mean signal)
+    electrons              Retention          lag                            electrons (mean signal)
     electrons              Transport          charge_transfer                electrons (mean signal)
     electrons              before_shot        fpn, fpn_maps                  electrons (mean signal)
     electrons              NoiseSource        shot_noise, fpn, fpn_shading,  electrons
@@ -61,6 +62,7 @@ from vcam_cli.effects.pixel.charge_diffusion import ChargeDiffusion
 from vcam_cli.effects.pixel.charge_transfer import ChargeTransfer
 from vcam_cli.effects.pixel.crosstalk import Crosstalk
 from vcam_cli.effects.pixel.dark_current import DarkCurrent
+from vcam_cli.effects.pixel.lag import Lag
 from vcam_cli.effects.pixel.microlens import Microlens
 from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
 from vcam_cli.effects.pixel.pixel_vignetting import PixelVignetting
@@ -89,6 +91,7 @@ ORDER: tuple[type[Effect], ...] = (
     Crosstalk,
     Smear,
     DarkCurrent,
+    Lag,
     ChargeTransfer,
     *SOURCES,
     Blooming,

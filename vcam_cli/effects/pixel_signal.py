@@ -184,6 +184,14 @@ class Charge(Effect):
         """Return the mean electrons that a pixel collects per second [e/s]."""
 
 
+class Retention(Effect):
+    """Charge that is read one frame later."""
+
+    acts_on_light = False
+    share: float
+    """Share of a pixel's charge."""
+
+
 class Transport(Effect):
     """Charge that arrives late: every electron by its own chance, so means are enough."""
 

@@ -117,7 +117,7 @@ def _prepare(solved: Solved, picture: ScenePicture, run: Run) -> Prepared:
 
 
 def take(
-    camera: Camera, run: Run, shared: Shared
+    camera: Camera, run: Run, shared: Shared, before: Prepared | None = None
 ) -> tuple[Frame, Callable[[Sequence[Step]], ProcessedPicture], tuple[str, ...]]:
     """Take a frame of a camera.
 
@@ -125,6 +125,8 @@ def take(
     ----------
     camera, run, shared
         As those of `prepare`.
+    before : Prepared, optional
+        The frame before it in a sequence.
 
     Returns
     -------
@@ -139,6 +141,7 @@ def take(
         frame, notes = _take_bracket(camera, run, shared)
     else:
         ready, notes = prepare(camera, run, shared)
+        ready = ready if before is None else ready.after(before)
         frame = take_frame(ready, run.workers, run.stages, run.device)
     return frame, picture_of(frame, run.workers), notes
 

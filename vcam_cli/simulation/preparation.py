@@ -15,7 +15,7 @@ from vcam_cli.camera.derived.electrical import Electrical
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.effects.base import of_kind
-from vcam_cli.effects.pixel_signal import Overflow
+from vcam_cli.effects.pixel_signal import Overflow, Retention
 from vcam_cli.effects.signal_chain import Limit, full_well
 from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.image_formation import photon_rate
@@ -142,6 +142,27 @@ class Prepared:
             return held if self.sharing is None else self.sharing.coupled(held)
 
         return settled
+
+    def after(self, before: Prepared) -> Prepared:
+        """Return it as the next one of a sequence: with the charge that stayed in its pixels.
+
+        Parameters
+        ----------
+        before : Prepared
+            The frame before it.
+
+        Returns
+        -------
+        Prepared
+            The same camera, whose light has charge of the frame before in it; itself where none
+            stays.
+        """
+        held = before.held_electrons
+        rate, kind = self.rate, self.rate.dtype.type
+        for lag in of_kind(self.plan.active, Retention):
+            own = exposure.mean_electrons(rate, self.exposure_time, self.plan.active)
+            rate = rate + kind(lag.share / self.exposure_time) * (held - own)
+        return replace(self, rate=rate)
 
     @property
     def dark_rate(self) -> float:

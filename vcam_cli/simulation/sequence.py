@@ -115,12 +115,13 @@ def frames(
     settings, reference = None, camera.exposure.reference
     shared = Shared(RateCache(LIGHT))
     solved = solve(camera)
+    result: Result | None = None
     for each in frame_cameras(camera, count, rate):
         if settings is not None:
             each = exposure_control.set_exposure(each, settings)
             timed = each.exposure.model_copy(update={"reference": reference})
             each = each.model_copy(update={"exposure": timed})
-        result = simulate(each, workers, watch, shared, device)
+        result = simulate(each, workers, watch, shared, device, result)
         if camera.exposure.auto is not None:
             if reference is None:  # where the first frame has it, all others do
                 reference = result.exposure_time / 2 + solved.lines.last / 2

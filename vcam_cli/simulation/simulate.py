@@ -88,6 +88,7 @@ def simulate(
     watch: Observer | Callback | None = None,
     shared: Shared | None = None,
     device: str = "cpu",
+    before: Result | None = None,
 ) -> Result:
     """Simulate `camera` looking at its scene.
 
@@ -105,6 +106,9 @@ def simulate(
     device : str, optional
         "gpu" draws noise and reads the charge on a graphics processor, with other random numbers
         of the same statistics; the light is the processor's. See `frames` for many pictures.
+    before : Result, optional
+        The frame before this one in a sequence, whose charge lags (`pixel.lag`); by default the
+        pixels have seen the light of this one.
 
     Raises
     ------
@@ -123,7 +127,7 @@ def simulate(
     try:
         shared = shared or RECENT.shared_with(camera)
         run = Run(workers or threads(camera), stages, shared.rate_cache, backend.device(device))
-        return _simulate(camera, run, shared)
+        return _simulate(camera, run, shared, before)
     except BadInput as error:
         raise error.with_places(camera.locate) from None
 
@@ -165,8 +169,9 @@ def prepare(
         raise error.with_places(camera.locate) from None
 
 
-def _simulate(camera: Camera, run: Run, shared: Shared) -> Result:
-    frame, steps, notes = pipeline.take(camera, run, shared)
+def _simulate(camera: Camera, run: Run, shared: Shared, before: Result | None) -> Result:
+    last = None if before is None else before.frame
+    frame, steps, notes = pipeline.take(camera, run, shared, last)
     result = Result(frame, run.stages, run.workers, steps, remarks.Notes(frame, notes))
     if needs_picture(
         frame.solved

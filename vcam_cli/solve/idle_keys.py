@@ -90,7 +90,7 @@ def _is_lit_by_flicker(camera: Camera) -> bool:
 
 
 FOLLOW = Rule(
-    ("exposure.auto.follow",),
+    ("exposure.auto.follow", "pixel.lag"),
     lambda camera: True,
     "it acts from frame to frame, in sequences alone; take one with --frames 30 --fps 30",
 )

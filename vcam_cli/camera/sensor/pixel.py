@@ -425,6 +425,11 @@ class Pixel(Model):
         example="20 %",
         default=0.0,
     )
+    lag: Annotated[float, Percentage(least=0, below=1, example="2 %")] = key(
+        "share of a pixel's charge that is read in the next frame of a sequence",
+        example="2 %",
+        default=0.0,
+    )
     temperature: SiliconTemperature = key(
         "sensor temperature: sets kTC noise, and scales dark current given at another temperature",
         example="300 K",
