@@ -38,6 +38,12 @@ PHRASES = {
     r"\bin so many words\b": "explicitly",
     r"\bsays? so\b": "report; state",
     r"(?-i:\bis none\b)": "there is no ...; the name of the thing",
+    r", of which\b": "start a new sentence",
+    r"\bnine times in ten\b": "90 %",
+    r"\bright camera files?\b": "correct camera file",
+    r"\btaken? (?:to be|as 0)\b": "assumed to be; becomes 0",
+    r"\bis said to\b|\bthere can be\b": "state it",
+    r"\bwhat kind of\b": "kind of",
 }
 """A phrase -> what to write in its place."""
 SKIP = "plain-words: skip"

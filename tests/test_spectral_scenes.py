@@ -123,8 +123,8 @@ def test_level_from_file_by_hand(tmp_path):
     np.testing.assert_allclose(result.mean_electrons, electrons(even), rtol=1e-6)
     fine = np.arange(400, 700.001, 0.01)
     level = 683 * np.trapezoid(0.01 * cmf()[1].evaluate(fine * 1e-9), fine)
-    assert f"white is taken to be {level:.4g} cd/m2" in result.notes
-    assert f"white is taken to be {level:.4g} cd/m2" in prepare(result.frame.camera)[1]
+    assert f"white is assumed to be {level:.4g} cd/m2" in result.notes
+    assert f"white is assumed to be {level:.4g} cd/m2" in prepare(result.frame.camera)[1]
 
 
 def test_a_stated_level_scales_the_file(tmp_path):

@@ -204,5 +204,5 @@ def test_what_is_no_transfer_is_refused_with_its_place(table, message, tmp_path)
                {"optics.psf": {"file": "mtf.csv", "pitch": "1 um"}}],
 )  # fmt: skip
 def test_what_is_measured_stands_alone(beside, tmp_path):
-    with pytest.raises(BadInput, match="which has all aberrations in it"):
+    with pytest.raises(BadInput, match="which includes all aberrations"):
         with_file(tmp_path, text(), **beside)

@@ -337,7 +337,7 @@ def test_a_little_below_zero_is_taken_as_zero(tmp_path) -> None:
     light[1, 1] = -1e-6
     found = light_of(write(tmp_path / "a.exr", light))
     assert found.data.min() == 0
-    assert found.notes == ("3 of 48 values are negative, down to -1e-06; they are taken as 0",)
+    assert found.notes == ("3 of 48 values are negative, down to -1e-06; they become 0",)
 
 
 def test_compare_sees_the_same_picture_in_other_spaces(tmp_path) -> None:

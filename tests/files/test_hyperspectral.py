@@ -179,7 +179,7 @@ class TestEnvi:
         )
         cube[1, 2] = 0
         (note,) = holds(path, cube=cube)
-        assert note == "5 of 120 values are marked as no data and taken as 0"
+        assert note == "5 of 120 values are marked as no data and become 0"
 
     def test_bad_bands_are_left_out_and_told(self, tmp_path):
         """What is in them counts in no way: no light, no error."""
@@ -207,7 +207,7 @@ class TestEnvi:
         )
         found, notes = read(path)
         assert not found.data[0, 1].any()
-        assert notes == ("5 of 120 values are marked as no data and taken as 0",)
+        assert notes == ("5 of 120 values are marked as no data and become 0",)
 
     @pytest.mark.parametrize("ending", ["", ".img", ".DAT", ".bil"])
     def test_names_of_the_raw_file(self, ending, tmp_path):
@@ -386,7 +386,7 @@ class TestIsetcam:
             np.testing.assert_allclose(cube.data, CUBE * unit, rtol=2.5e-7)
             np.testing.assert_allclose(cube.bands.wavelengths, NM * 1e-9)
             assert cube.bands.quantity == quantity
-            said = ("cube is taken as radiance in W/(sr m2 nm)",)
+            said = ("cube is read as radiance in W/(sr m2 nm)",)
             assert notes == (said if quantity == "radiance" else ())
         wrong = Variables.model_validate({"radiance": "rad", "wavelength": "bands"})
         with pytest.raises(BadInput, match=r"has no rad; it holds .*cube"):

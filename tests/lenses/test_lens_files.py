@@ -121,7 +121,7 @@ def test_remarks_say_what_is_ignored_and_chosen(tmp_path):
     beyond = TEXT.replace("PWAV 1", "VCYN 0 0 0.2 0\nPWAV 1")  # a field that is not used
     assert lens_of(tmp_path, beyond).remarks == ()
     several = TEXT.replace("GCAT SCHOTT", "GCAT OHARA SCHOTT")
-    assert lens_of(tmp_path, several).remarks == ("glass N-BK7 is taken as schott's",)
+    assert lens_of(tmp_path, several).remarks == ("glass N-BK7 is read as schott's",)
     near = TEXT.replace("DISZ INFINITY", "DISZ 500")
     assert "scene.distance" in lens_of(tmp_path, near).remarks[0]
 

@@ -150,7 +150,7 @@ def told(found: Verification) -> str:
 
 
 def main(right: int = 20) -> None:
-    """Print how many quantities differ, of right camera files and of wrong ones."""
+    """Print how many quantities differ, of correct camera files and of wrong ones."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         camera = true_camera(folder)

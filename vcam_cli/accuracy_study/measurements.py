@@ -154,7 +154,7 @@ def settings_key(camera: Camera) -> str:
 
 
 def _computation(result: Result) -> tuple[str, str, tuple[str, ...], bytes]:
-    """Return what two frames have in common of which each step is the same."""
+    """Return the common result of two frames whose every step is the same."""
     frame = result.frame
     chosen = replace(frame.settings, tolerance=0, oversampling=0)
     way = replace(frame.spectrum, lost_rms=0, changes={})

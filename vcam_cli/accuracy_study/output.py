@@ -72,7 +72,7 @@ def report_arguments(found: Study) -> dict[str, Any]:
         "accuracy.png": "Error over seconds of every preset and setting; the plan's estimate of"
         " each effect over its measured effect",
     }
-    about = "Error of the mean raw frame against a converged reference, and the seconds it takes."
+    about = "Error of the mean raw frame against a converged reference, and the time in seconds."
     title = f"{found.camera.name}: accuracy and time"
     return {
         "title": title,

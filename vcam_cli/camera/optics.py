@@ -328,7 +328,7 @@ def _measured_alone(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
     measured = [name for name in ("psf", "mtf") if given.get(name) not in (None, "none")]
     for name in ("defocus", "focus_shift", "zernike", *measured[1:]):
         if measured and name in given and (name in measured or not _neutral(name, given[name])):
-            message = f"cannot be given beside {measured[0]}, which has all aberrations in it"
+            message = f"cannot be given beside {measured[0]}, which includes all aberrations"
             remedy = f"remove {name}, or write {measured[0]}: none"
             yield fault((name,), message, remedy, given[name])
 
@@ -451,7 +451,7 @@ class Optics(Model):
         default="fixed",
     )
     focus_window: Annotated[FocusWindow, mapping(FocusWindow)] = key(
-        "what focus: auto judges; default the middle half of the picture's width and height",
+        "window of focus: auto; default the middle half of the picture's width and height",
         example={"x": 0.3, "y": 0.7, "width": 0.1, "height": 0.1},
         default=FocusWindow,
     )

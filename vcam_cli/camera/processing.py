@@ -108,7 +108,7 @@ def _plugin(name: Any, given: Any) -> type[PluginStep]:
 
 
 OF_COLORS = ("white_balance", "color_correction", "gamut_mapping")
-"""Steps that change colors, of which a monochrome array has none."""
+"""Steps that change colors; a monochrome array has no colors."""
 STEP_LIST = Either(_steps, list[_ANY])
 """The type of `processing`."""
 
@@ -209,7 +209,7 @@ def stage_mistakes(step: Any, before: Sequence[Any]) -> Iterator[tuple[str, str]
     Parameters
     ----------
     step : Step
-        The step, of which `name` counts, and `acts_on` if it has one.
+        The step: its `name`, and `acts_on` if it has one.
     before : sequence of Step
         The steps before it.
 

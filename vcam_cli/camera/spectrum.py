@@ -295,7 +295,7 @@ def flat(value: float, most: float | None = 1.0) -> SpectrumSpec:
 
 
 def balanced(filters: Mapping[str, SpectrumSpec]) -> dict[str, SpectrumSpec]:
-    """Return the filters of a set, of which those per watt keep their balance."""
+    """Return the filters of a set; filters per watt keep their balance."""
     together = tuple(factor for spec in filters.values() for factor in spec.factors)
     return {color: replace(spec, together=together) for color, spec in filters.items()}
 

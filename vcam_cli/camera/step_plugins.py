@@ -75,7 +75,7 @@ def registered() -> dict[str, EntryPoint]:
 
 @lru_cache(1)
 def _entry_points(folders: tuple[tuple[str, int], ...]) -> dict[str, EntryPoint]:
-    """Return the entry points in folders, of which each comes with the time of its last change."""
+    """Return the entry points in folders, each folder with the time of its last change."""
     return {point.name: point for point in entry_points(group=GROUP)}
 
 

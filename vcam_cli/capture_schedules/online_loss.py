@@ -34,7 +34,7 @@ from vcam_cli.scheduling.sensor import (
 PIXELS = 1 << 16
 """Photocurrents that represent a scene, evenly by brightness."""
 RUNS = 4
-"""Integrations with noise of their own, of which the losses are averaged."""
+"""Integrations, each with its own noise, over which losses are averaged."""
 MOST_ELECTRONS = 1e18
 """Electrons in a step of an integration: more than fit into any well, and NumPy can draw them."""
 FIRST = 1e-4
@@ -279,7 +279,7 @@ def _admissible_time(time: float, before: float, constraints: Constraints) -> fl
 
 
 def _exposure_search(first: float, sensor: Sensor) -> ExposureSearch:
-    """Return the search for a scene of which nothing is known, from well below the right time."""
+    """Return the search without prior knowledge of the scene, from well below the right time."""
     if np.isfinite(sensor.max_time):
         return ExposureSearch(FIRST * sensor.max_time)
     return ExposureSearch(first / 64)  # nothing limits the brightness: two steps too short

@@ -43,7 +43,7 @@ def mistake(pdf: Pdf, study: ScheduleStudy) -> tuple[str, str] | None:
     usual = sensor.well_capacity / (0.1 * sensor.max_time if sensor.max_time else 0.01)
     message = f"photocurrents of a table are e/s, the brightest {pdf.max:.4g} e/s, {why}"
     text = units.render(float(f"{usual:.2g}"), "rate")
-    return message, f"say what the brightest is, in the pdf: brightest: {text}"
+    return message, f"give the largest photocurrent, in the pdf: brightest: {text}"
 
 
 def notes(pdf: Pdf, study: ScheduleStudy) -> Iterator[str]:

@@ -9,11 +9,11 @@ from vcam_cli.reports.page import Facts
 
 CAPTIONS = {
     "schedule.csv": "The capture times of every method, relative to the first.",
-    "summary.csv": "What schedules are worth. Gain: E[SNR] over that of a single capture; gap: how"
-    " far, at most, the best schedule there can be lies above.",
+    "summary.csv": "Gain of each schedule: E[SNR] over that of a single capture. Gap: upper bound"
+    " on the relative distance to the optimal schedule.",
     "segments.csv": "Gain of schedules computed on coarser pdfs.",
     "targets.csv": "The fewest captures that reach each gain.",
-    "online.csv": "What planning capture by capture loses.",
+    "online.csv": "Loss by planning one capture at a time.",
     "charge.png": "Charge over time of a bright and a dark pixel, and the samples that count",
     "captures.png": "The capture times of every method",
     "pdf.png": "The probability of photocurrents, and its approximation",

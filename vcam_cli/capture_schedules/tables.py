@@ -104,7 +104,7 @@ def notes(study: ScheduleStudy, task: Task, found: Sequence[MethodResult]) -> It
 def _probability_notes(study: ScheduleStudy) -> Iterator[str]:
     total = sum(segment.probability for segment in study.pdf.segments or ())
     if study.pdf.segments is not None and abs(total - 1) > 1e-6:
-        yield f"probabilities add up to {total:.6g}; they are taken relative to that"
+        yield f"probabilities add up to {total:.6g}; they are divided by this sum"
 
 
 def _level_notes(study: ScheduleStudy, task: Task) -> Iterator[str]:
@@ -138,7 +138,7 @@ def _approximation_notes(task: Task, found: Sequence[MethodResult]) -> Iterator[
 
 
 def _saturation_notes(task: Task, found: Sequence[MethodResult]) -> Iterator[str]:
-    """Yield what real pixels lose, of which noise fills one in two at the limit of a capture."""
+    """Yield the loss of real pixels: at the limit of a capture, noise fills every second one."""
     optimal = [one.schedule for one in found if one.method == "optimal"]
     if not task.pdf.discrete or not optimal:
         return

@@ -131,7 +131,7 @@ def directional_mtf(
     transfer : Transfer
         Transfer of the lens and the silicon.
     effects : sequence of Effect
-        Effects, of which separable transfers count.
+        Effects; separable transfers are used.
     color : int
         Index of the color.
     frequency : (n,) array

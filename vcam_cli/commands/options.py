@@ -160,18 +160,26 @@ Accuracy = Annotated[
 ]
 Frames = Annotated[
     int | None,
-    typer.Option("--frames", metavar="N", min=1, max=9999, help="Take a sequence; with --fps."),
+    typer.Option(
+        "--frames",
+        metavar="N",
+        min=1,
+        max=9999,
+        help="Number of frames of a sequence; requires --fps.",
+    ),
 ]
 FrameRate = Annotated[
     float | None,
-    typer.Option("--fps", metavar="F", min=1e-6, max=1e6, help="Frames a second, of --frames."),
+    typer.Option(
+        "--fps", metavar="F", min=1e-6, max=1e6, help="Frames per second of the sequence."
+    ),
 ]
 Expect = Annotated[
     list[str] | None,
     typer.Option(
         "--expect",
         metavar="'METRIC >= VALUE'",
-        help="A limit that a metric keeps; exit with 4 where it does not. Repeatable.",
+        help="Limit on a metric; exit code 4 if it is missed. Repeatable.",
     ),
 ]
 Json = Annotated[
@@ -180,9 +188,7 @@ Json = Annotated[
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="No messages but errors.")]
 Report = Annotated[
     bool,
-    typer.Option(
-        "--report", help="Also write report.html: all of it on one page, to read or send."
-    ),
+    typer.Option("--report", help="Also write report.html: one page with all results."),
 ]
 
 

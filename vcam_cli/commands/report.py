@@ -22,7 +22,7 @@ def report(
 ) -> None:
     """Write one page that shows runs side by side: pictures, settings, metrics, effects.
 
-    Pictures zoom together. The page is self-contained and can be sent.
+    Pictures have a common zoom. The page is self-contained and can be sent.
 
     \b
     Example:

@@ -87,13 +87,13 @@ def print_report(found: "Verification", path: Path) -> None:
     )
     if found.judged:
         console.print(
-            f"{all_['differing']} of {all_['judged']} quantities of frames differ by more than"
-            f" chance ({FALSE_ALARMS:.0%} of right camera files have one)"
+            f"{all_['differing']} of {all_['judged']} quantities of frames differ significantly"
+            f" (a correct camera file has such a quantity in {FALSE_ALARMS:.0%} of cases)"
         )
     if found.least_errors:
         errors = found.least_errors.items()
         listed = [f"{100 * least:.2g} % of {name}" for name, least in errors]
-        console.print(f"errors found nine times in ten: {'; '.join(listed)}")
+        console.print(f"smallest errors that 90 % of tests detect: {'; '.join(listed)}")
     console.print(f"{path}/verify.csv, errors.png")
 
 

@@ -26,7 +26,7 @@ from vcam_cli.errors import BadInput, Problem
 
 @dataclass(frozen=True)
 class Document(Generic[M]):
-    """A file read once, of which any number of models are made, each with its overrides."""
+    """A file read once: a source of any number of models, each with its overrides."""
 
     file: Path
     tree: Node

@@ -15,7 +15,7 @@ from vcam_cli.errors import BadInput
 
 @dataclass(frozen=True)
 class Alternatives:
-    """Groups of keys of which a mapping gives one: an override drops the others of its base."""
+    """Groups of alternative keys: an override with one drops the others of its base."""
 
     groups: tuple[frozenset[Key], ...]
     path: errors.Path | None = None

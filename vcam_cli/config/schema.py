@@ -85,7 +85,7 @@ def with_parts(schema: Schema, name: str, sections: dict[str, str], title: str) 
     _add_overrides(definitions, [name, *sections.values()])
     base = {
         "type": "string",
-        "description": f"{_PART} that this file changes: the rest is taken from it.",
+        "description": f"{_PART} that this file changes: all other keys are those of that file.",
         "examples": ["OTHER.yaml"],
     }
     use = {

@@ -34,7 +34,7 @@ DIGITS = 9
 
 @dataclass(frozen=True)
 class Scene:
-    """A chart, or a picture of which scenes are crops."""
+    """A chart, or a picture to crop scenes from."""
 
     name: str
     source: dict[str, Any]
@@ -84,7 +84,7 @@ class Frame:
 
 
 def _placed(value: Any, place: Node) -> Node:
-    """Return a value as a tree of which every part stands at one place."""
+    """Return a value as a tree, every part with the same place in the file."""
     if isinstance(value, Mapping):
         value = {key: _placed(item, place) for key, item in value.items()}
     elif isinstance(value, (list, tuple)):

@@ -146,7 +146,7 @@ class Scenes(Model):
     """Scenes of the frames."""
 
     files: Annotated[tuple[str, ...], Either(_patterns, str | list[str])] = key(
-        "pictures, of which each scene is a crop at random",
+        "pictures; each scene is a random crop of one",
         example="photos/*.png",
         default=(),
     )
@@ -156,7 +156,7 @@ class Scenes(Model):
         default=(),
     )
     samples_per_pixel: Annotated[float, Number(above=0, most=64, example="1")] = key(
-        "samples of a picture over the width of a pixel: how much of it a crop takes", default=1.0
+        "samples of a picture across one pixel; more of them take a larger crop", default=1.0
     )
     frames_each: Annotated[int, Whole(least=1, most=MOST_FRAMES, example="4")] = key(
         "consecutive frames of one scene, with the same crop and light", default=1

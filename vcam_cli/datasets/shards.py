@@ -78,7 +78,7 @@ class Packer:
         return files if all(map(proofs.holds, files)) else None
 
     def pack(self, shard: Shard) -> dict[str, Fingerprint]:
-        """Pack a shard of which all frames are finished; return its files.
+        """Pack a shard after all its frames are finished; return its files.
 
         Raises BadInput where a file of another program is in the way, CannotDo.
         """

@@ -16,9 +16,9 @@ from vcam_cli.files.records import LOCK
 POINTS = "points"
 """Folder of a sweep's points."""
 CLAIMS = ".claims"
-"""File there of which processes lock bytes."""
+"""File there whose bytes processes lock."""
 STUDIES, STUDIES_END = 1 << 60, 1 << 61
-"""Bytes of which each process of a sweep holds its study's. Those before are claims of points."""
+"""Bytes of a study: each process of a sweep locks its own. Those before are claims of points."""
 
 
 def require_no_sweep(folder: Path) -> None:

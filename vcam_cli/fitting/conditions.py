@@ -141,7 +141,7 @@ def measure(measurement: Measurement, watch: Observer) -> Conditions:
         notes += stack.notes
         if stack.drift > DRIFT and not stack.entry.is_dark:
             notes.append(
-                f"{stack.label}: the light drifts by {stack.drift:.1%}, which is taken out"
+                f"{stack.label}: the light drifts by {stack.drift:.1%}, which is corrected"
             )
     usual = usual_temperature(measurement)
     here = [(entry, mean) for entry, mean in averages if entry.temperature in (None, usual)]

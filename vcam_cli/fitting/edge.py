@@ -25,7 +25,7 @@ MOST_ERROR = 0.03
 ASSUMED = 0.02
 """Noise of one frame by itself, in the same unit as `_noise` returns it."""
 SHORTEST = 380e-9
-"""Wavelength of which the lens's aperture leaves the most [m]."""
+"""Wavelength with the highest MTF of the aperture [m]."""
 COLUMNS = ("frequency_lp_per_mm", "value")
 
 

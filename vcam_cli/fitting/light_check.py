@@ -14,7 +14,7 @@ from vcam_cli.verification.model import Measurement
 APART = 0.02
 """Difference from which two signals differ, relative to the brightest."""
 SURE = 5.0
-"""Standard errors by which signals differ by more than chance."""
+"""Standard errors from which signals differ significantly."""
 FULL = 0.9
 """Part of the brightest signal above which pixels may be full, and brighter light gives no more."""
 

@@ -12,7 +12,7 @@ from vcam_cli.quality.photon_transfer import ROUNDING
 from vcam_cli.verification.stack_statistics import Estimate
 
 SIGNIFICANT = 5.0
-"""Standard errors from which tails, or a correlation of rows, are more than chance."""
+"""Standard errors from which tails, or a correlation of rows, are significant."""
 SHAPES = -0.45, 0.3
 """Shapes of Tukey's lambda distribution that are sought: -1/2 has no variance; 0.135 is nearly
 normal."""
@@ -27,7 +27,7 @@ FINENESS = 12
 
 
 def is_significant(found: Estimate) -> bool:
-    """Return whether a number is above 0 by more than chance."""
+    """Return whether a number is significantly above 0."""
     return found.value > SIGNIFICANT * found.error + found.below
 
 

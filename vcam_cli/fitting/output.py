@@ -41,7 +41,7 @@ def report_arguments(found: Fit) -> dict[str, Any]:
         "photon_transfer.png": "Temporal variance over signal, from which the gain follows",
         "dark_signal.png": "Dark frames: black level and dark current",
         "intervals.png": "90 % confidence intervals",
-        "mtf.csv": "Modulation transfer of the lens, the pixel's own taken out.",
+        "mtf.csv": "MTF of the lens: that of the edge, divided by that of the pixel.",
     }
     return {
         "title": f"{found.measurement.name}: a camera from its frames",

@@ -23,7 +23,7 @@ ALIEN = 7.0
 """Robust standard deviations of the columns' means from which a column is unlike the others. Of few
 columns these are themselves known to some 15 %: of 48 normal ones none is so far off."""
 LEAST_COLUMNS = 32
-"""Columns of which a robust deviation is taken; in fewer none is unlike the others."""
+"""Least number of columns for a robust deviation; among fewer no outlier is reported."""
 ROUNDS = 30
 """Steps of the fit of least absolute deviations; after a third of them aliens have no weight."""
 
@@ -37,7 +37,7 @@ class Pattern:
     column: Estimate
     row: Estimate
     slow: Estimate
-    """What changes slowly over the array; where it is more than chance the others are without."""
+    """Slow variation over the array; where it is significant the others exclude it."""
     alien: tuple[int, ...] = ()
     """Numbers of columns of the plane unlike the others, which all but `total` leave out."""
     largest: float = 0.0

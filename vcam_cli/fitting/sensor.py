@@ -31,7 +31,7 @@ from vcam_cli.verification.stack_statistics import Estimate, combine
 LEAST_BEND = 0.005
 """Relative misfit of the responsivity from which it is said: lamps are steady to that."""
 SURE = 5.0
-"""Standard errors by which black levels of colors differ by more than chance."""
+"""Standard errors from which black levels of colors differ significantly."""
 LEAST_STEP = 0.05
 """Difference of black levels that a camera file has no use for [DN]."""
 

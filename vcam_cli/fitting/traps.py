@@ -34,7 +34,7 @@ LEAST_FRAMES = 6
 RARE = 0.01
 """Share of the pixels whose variance in half of the stack counts as large."""
 SURE = 5.0
-"""Standard deviations by which more pixels than by chance have two large variances."""
+"""Standard deviations from which the count of pixels with two large variances is significant."""
 CLEAR = 12.0
 """Variance over that of the median pixel from which the third moment's sign tells the state."""
 EDGES = np.concatenate([[0.0], np.linspace(0.2, 3, 29), np.geomspace(3.3, 1000, 30), [np.inf]])
@@ -116,7 +116,7 @@ def _variance(values: Array) -> Array:
 
 
 def find_traps(moments: list[PixelMoments]) -> Traps | None:
-    """Return the telegraph noise of pixels; None where none is more than chance.
+    """Return the telegraph noise of pixels; None where it is not significant.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def _most_likely(cost: Cost) -> tuple[Array, Array] | None:
 
 
 def _go_together(moments: list[PixelMoments]) -> bool:
-    """Return whether more pixels than by chance have large variances in both halves."""
+    """Return whether significantly many pixels have large variances in both halves."""
     first, second = (np.concatenate([m.halves[h] for m in moments]) for h in (0, 1))
     large = [each > np.quantile(each, 1 - RARE) for each in (first, second)]
     chance = float(large[0].mean() * large[1].mean()) * len(first)

@@ -107,7 +107,7 @@ class Axis:
         return 0.0 if self.virtual_pixels is None or abs(shift) <= NEAR else shift
 
     def pixel_waves(self, odd: bool = False) -> list[tuple[bool, Array | None]]:
-        """Return of which of the pixels' own waves the scene's waves are made.
+        """Return the expansion of the scene's waves in the pixels' own waves.
 
         cos(a + b) = cos a cos b - sin a sin b, sin(a + b) = sin a cos b + cos a sin b.
 

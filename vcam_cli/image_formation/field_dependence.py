@@ -315,7 +315,7 @@ def _families(changes: Sequence[Array], allowed: float) -> tuple[list[tuple[Fami
 
     A mode is its family, and its share in each ring. The error of a ring is the rms of its tables,
     each entry weighed by its expected power, in the mean over colors. Singular vectors come from
-    the rings' products with each other, of which there are few. Means over all azimuths are 0 but
+    the few products of the rings with each other. Means over all azimuths are 0 but
     of order 0, whose mean over the rings is no mode.
     """
     power = _expected_power(changes[0].shape[-1]) / changes[0].shape[2]

@@ -334,7 +334,7 @@ def chebyshev(at: Array) -> tuple[Array, Array]:
 
 
 def _consecutive(index: Array) -> Array | slice:
-    """Return consecutive indices, rising or falling, as a slice, of which NumPy makes a view."""
+    """Return consecutive indices, rising or falling, as a slice, so that NumPy returns a view."""
     steps = np.diff(index)
     if not len(steps) or abs(steps[0]) != 1 or (steps != steps[0]).any():
         return index

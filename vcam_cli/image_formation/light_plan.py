@@ -56,7 +56,7 @@ instead. Beside a blur that changes over the field, which has the larger tables,
 LOOSEST = 8.0
 """Bounds over exact sums, at most, of edges that lie anywhere to the pixels: larger ones stay."""
 MOST_TRIED = 10
-"""Effects of which all subsets are tried; of more, those that change least."""
+"""Number of effects up to which all subsets are tried; beyond it, those that change least."""
 
 
 @dataclass(frozen=True)

@@ -127,7 +127,7 @@ def photo_rate(path: OpticalPath, scene: AnyScene, planes: bool = False) -> Rate
 def _gathered(path: OpticalPath, scene: AnyScene, planes: bool) -> Rate:
     """Return the light in every place of the lattice, all effects acting that a path has."""
     layers, report = warped_layers(path, scene)
-    if path.is_displaced:  # more changes than the blur, of which the report knows
+    if path.is_displaced:  # the report covers the blur only
         moved = {motion.name for motion in of_kind(path.effects, ImageMotion)}
         known = {name: change for name, change in report.changes.items() if name not in moved}
         report = replace(report, changes=known)

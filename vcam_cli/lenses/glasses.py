@@ -172,4 +172,4 @@ def find(name: str, makers: tuple[str, ...] = ()) -> tuple[CatalogGlass, str | N
             )
         chosen = same[0]
     sure = (not makers and len(by_maker) == 1) or makers == (chosen.maker,)
-    return chosen, None if sure else f"glass {chosen.name} is taken as {chosen.maker}'s"
+    return chosen, None if sure else f"glass {chosen.name} is read as {chosen.maker}'s"

@@ -142,7 +142,7 @@ class LensTable(FileModel):
 
     name: Word = key("name of the lens; default the file's", example="my-lens", default="lens")
     kind: Literal["lens"] = key("what the file describes", default="lens")
-    title: Text = key("what it is, in a line", example="Cooke triplet, 1942", default="")
+    title: Text = key("name of the lens, in a line", example="Cooke triplet, 1942", default="")
     source: Text = key("where the numbers come from", example="US 2,453,260", default="")
     unit: Annotated[str, Choice(*UNITS)] = key("of all lengths in the table", default="mm")
     primary: Wavelength = key(

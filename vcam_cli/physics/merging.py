@@ -1,4 +1,4 @@
-"""Merging of several readings of one signal, of which the finer ones saturate first.
+"""Merging of several readings of one signal; the finer ones saturate first.
 
 A fine reading x is weighed in while it does not saturate: of the coarse estimate y
 

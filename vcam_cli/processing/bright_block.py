@@ -2,7 +2,7 @@
 
 The picture is cut into blocks of 16 x 16 pixels. Blocks in which a pixel is saturated are left
 out: there the color of the light is lost. Of the others the brightest hundredth, at least one, is
-taken to be white or gray, and each color is multiplied until its means over them are equal.
+assumed to be white or gray, and each color is multiplied until its means over them are equal.
 
 Why it may beat gray world: a large red wall shifts the mean of the whole picture, but what is
 brightest in a picture is most often a white thing or a highlight, both of the light's color. Where
@@ -67,7 +67,7 @@ def measure(block: Block, raw: np.ndarray, context: Context) -> Blocks:
 
 
 def white_means(parts: list[Blocks]) -> np.ndarray:
-    """Return the means of the colors over the blocks that are taken to be white.
+    """Return the means of the colors over the blocks that are assumed to be white.
 
     Parameters
     ----------

@@ -66,7 +66,7 @@ def interpolate_to_grid(
     linear : ndarray
         Samples in linear light, in the shape of the frame.
     codes : ndarray
-        The same samples as they were measured, of which the highest are given.
+        The same samples as measured; the highest are returned.
     layout : Layout
         Positions and colors of the samples, and the grid.
     colors : int

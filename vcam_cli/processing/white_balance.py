@@ -1,6 +1,6 @@
 """White balance: one gain for each color.
 
-Gray world [1]: the average of a scene is taken to be gray, so each color is multiplied until all
+Gray world [1]: the average of a scene is assumed gray, so each color is multiplied until all
 means are equal.
 
 Illuminant: the light is known here, so the color of a perfect white is known; each color is

@@ -129,7 +129,7 @@ def slanted_edge_sfr(
     lattices : sequence of Lattice
         All pixels of one color.
     pitch : float
-        Pitch of the array's pixels, of which the bins are a quarter [m].
+        Pitch of the array's pixels [m]; bins are a quarter of it.
     reach : float
         Half the width of the window around the edge [m].
     degree : int

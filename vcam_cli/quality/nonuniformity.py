@@ -134,7 +134,7 @@ def spatial_variance(stack: Stack) -> SpatialVariance:
     by_row = float((each.mean(axis=-1) ** 2).mean()) - left / columns
     parts = np.array([[1, 0, 1 / rows], [0, 1, 1 / columns], [1, 1, 1]])
     if rows == columns == 2:
-        return SpatialVariance(total, 0.0, 0.0, total)  # 3 unknowns, of which 2 are left
+        return SpatialVariance(total, 0.0, 0.0, total)  # 2 of 3 unknowns are left
     column, row, pixel = np.linalg.solve(parts, [by_column, by_row, total])
     return SpatialVariance(total, float(row), float(column), float(pixel))
 

@@ -1,7 +1,7 @@
 """The photon transfer of a linear camera: gain, noise, efficiency and range from flat frames.
 
 A camera whose numbers are a straight line of its electrons adds noise of three kinds: that of the
-light, of which mean and variance are equal; that of the dark; and that of rounding. So the slope
+light, with equal mean and variance; that of the dark; and that of rounding. So the slope
 of the variance over the mean is the gain K, whatever else is unknown, and from K follows the rest.
 
 Frames come in pairs of equal light, since their difference knows no fixed pattern. Names and
@@ -292,7 +292,7 @@ def linearity(series: Series) -> Linearity:
     Parameters
     ----------
     series : Series
-        Pairs of flat frames at rising light, of which those in 5..95 % of saturation count.
+        Pairs of flat frames at rising light; those in 5..95 % of saturation are used.
 
     Returns
     -------

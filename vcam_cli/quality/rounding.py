@@ -24,7 +24,7 @@ from vcam_cli.quality.photon_transfer import MIN_DARK_VARIANCE, ROUNDING
 LIMIT = MIN_DARK_VARIANCE - ROUNDING
 """Largest variance of noise that is hidden by rounding [DN^2], eq 54 of [2]."""
 DEVIATIONS = np.linspace(0.0, 2.0, 401)
-"""Standard deviations of which the bounds are tabulated [DN]; above them rounding adds 1/12."""
+"""Standard deviations of the table of bounds [DN]; above them rounding adds 1/12."""
 MEANS = np.linspace(0.0, 0.5, 51)
 """Means between two codes; all others are like one of these [DN]."""
 CODES = np.arange(-12, 13)

@@ -84,7 +84,7 @@ class Branch:
     adc: Quantizer
     """The ADC's curve."""
     effects: tuple[Effect, ...]
-    """Effects that run, of which noise, clamps and transport count."""
+    """Effects that run; noise, clamps and transport are used."""
     name: str = ""
     """As in the channel of its codes; "" of pixels that are read once."""
     sensitivity: float = 1.0

@@ -43,7 +43,7 @@ def mean_electrons(rate: Array, time: Time, effects: tuple[Effect, ...]) -> Arra
     time : float or Array
         Exposure time, or those of frames (B, 1, 1) in the float type of `rate` [s].
     effects : tuple of Effect
-        Effects of the camera, of which the charges count.
+        Effects of the camera; those of kind Charge are used.
 
     Returns
     -------
@@ -65,7 +65,7 @@ def mean_dark(time: Time, effects: tuple[Effect, ...]) -> Time:
     time : float or Array
         Exposure time, or those of frames [s].
     effects : tuple of Effect
-        Effects of the camera, of which the charges count.
+        Effects of the camera; those of kind Charge are used.
 
     Returns
     -------

@@ -206,7 +206,7 @@ def variances(chain: ReadoutChain) -> tuple[float, float]:
     Parameters
     ----------
     chain : ReadoutChain
-        The ADC, and the effects that run, of which the temporal noise counts.
+        The ADC, and the effects that run; temporal noise is used.
 
     Returns
     -------

@@ -454,7 +454,7 @@ class Chart(ABC):
         """
         edges = self.edges()
         if edges is None:
-            raise ValueError(f"{type(self).__name__} does not say how much edge it has")
+            raise ValueError(f"{type(self).__name__} does not define the length of its edges")
         x, y = (
             np.concatenate([[c - size], np.sort(e[np.abs(e - c) < size]), [c + size]])
             for e, c, size in zip(edges, region.center, region.size, strict=True)

@@ -85,7 +85,7 @@ class ChangeBounds:
 
 
 WIDEST = 1.0
-"""Spread of a blur of which no bound is known, in numbers that stay finite [m]."""
+"""Spread of a blur without a known bound, in numbers that stay finite [m]."""
 
 
 def edge_energy(distance: Array, spread: Array, most: float, aperture: float = 0.0) -> Array:

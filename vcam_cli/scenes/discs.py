@@ -92,7 +92,7 @@ def paint(
     out : ndarray
         Averages (R, ny, nx).
     hidden : Cells, optional
-        Cells of which nothing is seen; they become 0.
+        Hidden cells; they become 0.
     divided : int, optional
         How often cells are divided in which edges meet, see `disc_edges.divisions`.
     keep : bool, optional

@@ -6,7 +6,7 @@ integrals over it are exact. A reflectance is lit by the scene's illuminant (eq 
 is light already, and has no lamp.
 
 What is a perfect white in a file of radiances? Where the file says it (an ISETCam scene its
-illuminant, an npz file its `white`), that. Else the scene is taken to be lit evenly by light of
+illuminant, an npz file its `white`), that. Else the scene is assumed lit evenly by light of
 its own average color, and to hold a white thing: the white has the file's mean spectrum, and the
 luminance of the brightest sample, a thousandth of the samples left out (highlights, lamps in the
 picture, hot pixels). A stated luminance is that of this white and scales the whole file;

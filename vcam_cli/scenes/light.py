@@ -3,7 +3,7 @@
 A camera file states one level, for a perfect white diffuser under the illuminant (or the display
 white of an image that emits): luminance [cd/m2], radiance [W/(sr m2)], or what falls on the
 diffuser, pi times as much: illuminance [lx], irradiance [W/m2]. Luminance is 683 lm/W times
-the integral with V(lambda), over all visible light, of which a camera file may simulate a part;
+the integral with V(lambda), over all visible light, not only the part that a camera file simulates;
 radiance is the plain integral over the scene's wavelengths. Irradiances from a file are as bright
 as they are.
 
@@ -193,5 +193,5 @@ def _luminance(scene: Scene) -> float:
         return scene.luminance
     if scene.illuminance is not None:
         return scene.illuminance / math.pi
-    message = "only a file of radiances has a level of its own"
+    message = "only a file of radiances has a luminance"
     raise bad(("scene", "luminance"), message, "write for example 100 cd/m2")

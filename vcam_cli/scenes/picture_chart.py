@@ -169,7 +169,7 @@ class CubeChart(PictureChart):
         return float((self.picture.reshape(-1, len(self.units)).max(axis=0) / self.units).max())
 
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
-        """Write the exact averages over the cells of mixtures, of which there are few."""
+        """Write the exact averages over the cells of the few mixtures."""
         height, width, _ = self.picture.shape
         down, rows = self._shares(y_edges * (height / self.frame.height) + height / 2, height)
         across, columns = self._shares(x_edges * (width / self.frame.width) + width / 2, width)

@@ -6,14 +6,14 @@ Move one capture of the best schedule to an end of its grid cell [lo, hi] of den
     -d2J/di^2 <= (f / lo) (2 + (hi^2 - lo^2) / lo^2),
 
 also where a neighbor stands in the same cell, so the better end loses no more than 1/8 (hi - lo)^2
-times that (the error of linear interpolation). Hence with N captures, of which the first is fixed,
+times that (the error of linear interpolation). Hence with N captures, the first one fixed,
 
     J* <= J_grid + (N - 1) max over cells of that loss + F(g_0),
 
 F(g_0) the probability below the first grid point. In a gap between segments J rises towards the
 gap's lower end, so gaps need no points.
 
-On the grid, the best n captures of which the first is g_j are worth
+On the grid, the best n captures from g_j on are worth
 
     V_1(j) = M_j / g_j,    V_n(j) = M_j x_j + max over a of (V_{n-1}(a) - M_a x_j),   x_j = 1 / g_j:
 

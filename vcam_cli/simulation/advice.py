@@ -78,7 +78,7 @@ def _dark_render(ready: Prepared) -> Iterator[str]:
     if float((ready.rate * time + dark >= ready.chain.saturation).mean()) < VISIBLE_SATURATION:
         return
     yield (
-        f"the scene's white is {white / held:.3g} times what saturates a pixel: saturated pixels"
+        f"the scene's white is {white / held:.3g} times the saturation level: saturated pixels"
         f" are {100 * held / white:.2g} % of white in the render, which is dark; shorten the"
         " exposure, or write the step tone: {white: sensor} in processing"
     )

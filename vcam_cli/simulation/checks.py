@@ -108,12 +108,12 @@ def check_size(camera: Camera) -> None:
 
 
 def _check_every_color(camera: Camera) -> None:
-    """Refuse scattered pixels of which a color has none to be demosaiced from (BadInput)."""
+    """Refuse scattered pixels if a color has no pixel (BadInput)."""
     layout = camera_layout(camera, geometry(camera))
     there = {layout.mosaic.colors[index] for index in np.unique(layout.color)}
     missing = [color for color in layout.mosaic.colors if color not in there]
     if missing and any(step.name == "demosaic" for step in camera.processing):
-        message = f"so few pixels have none of {', '.join(missing)}, and cannot be demosaiced"
+        message = f"too few pixels: none of color {', '.join(missing)}, and cannot be demosaiced"
         raise bad("array", message, "use a larger array")
 
 

@@ -264,7 +264,7 @@ def _full_charge(
     dark : float
         Dark rate of a pixel [e/s].
     effects : sequence of Effect
-        Effects, of which the transports count.
+        Effects; transports are used.
     full_rate : float
         Rate that fills a well [e/s].
     """

@@ -81,7 +81,7 @@ def lens_page(solved: Solved) -> LensPage:
     """
     traced = of_kind((e for e in solved.effects.found.values() if e is not None), TracedBlur)
     if not traced:
-        message = "is drawn where it is given by its surfaces"
+        message = "is drawn only from its surfaces"
         remedy = "write optics: {prescription: double-gauss}; `vcam list lenses` shows what ships"
         raise bad("optics", message, remedy)
     [blur] = traced

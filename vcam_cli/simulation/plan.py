@@ -4,7 +4,7 @@ The section keys of a camera file say what exists; `effects` says what the user 
 the plan decides on the other effects by two promises, with tolerance T:
 
 - mean: all that is left out changes the mean raw by at most T / 2 of full signal, rms over the
-  array; with what the settings err, the squares of which add to it, it stays within T;
+  array; with the errors of the settings, added in squares, it stays within T;
 - variance: at the 1st, 10th, 50th, 90th and 99th percentile of the scene's own signal, temporal and
   fixed-pattern variance each stay within 2 T of everything on.
 
@@ -46,7 +46,7 @@ VARIANCE_SHARE = 0.8
 """Part of the variance's tolerance for them; the rest is for percentiles that are estimated."""
 
 MOST_TRIED = 8
-"""Effects on electrons of which all subsets are tried; of more, those that change least."""
+"""Effects on electrons whose subsets are all tried; of more, those that change least."""
 
 
 @dataclass(frozen=True)

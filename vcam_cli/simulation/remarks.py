@@ -113,7 +113,7 @@ def remarks(ready: Prepared) -> tuple[str, ...]:
     if not isinstance(scene, CubeScene):
         return before
     level = luminance(scene.white, *visible_range(scene.white, band.start, band.stop))
-    notes = [f"white is taken to be {level:.4g} cd/m2"]
+    notes = [f"white is assumed to be {level:.4g} cd/m2"]
     if 0 < ready.spectrum.planes < len(scene.spectra):
         notes.append(
             f"{len(scene.spectra)} bands are simulated as {ready.spectrum.planes} mixtures of them;"
@@ -249,7 +249,7 @@ def _noise_beyond_table(ready: Prepared) -> Iterator[str]:
         if least <= gain <= most:
             continue
         yield (
-            f"the noise at an exposure.gain of {gain:.4g} is taken to be that at"
+            f"the noise at an exposure.gain of {gain:.4g} is assumed equal to that at"
             f" {min(max(gain, least), most):.4g}, {noise.at_gain(gain):.4g} e: the table of"
             f" {path} has gains from {least:.4g} to {most:.4g}"
         )
@@ -270,7 +270,7 @@ def _clipped_dark(ready: Prepared) -> tuple[str, ...]:
     share = float((ready.rate < min(threshold, largest)).mean())
     if share < VISIBLE_CLIPPING:
         return ()
-    what = "their mean comes out wrong"
+    what = "their mean is biased"
     if ready.times:
         what += ", and photocurrents of averaged samples with it"
     return (
@@ -347,7 +347,7 @@ def _colors_of_picture(ready: Prepared) -> tuple[str, ...]:
     model = picture_model(source.model, scene.picture.shape[2])
     if model == "reflectance":
         return ()
-    return (f"three channels are taken as reflectances with these sRGB colors (model: {model})",)
+    return (f"three channels are read as reflectances with these sRGB colors (model: {model})",)
 
 
 def _steps_not_shown(ready: Prepared) -> tuple[str, ...]:

@@ -48,8 +48,8 @@ def completed(solved: Solved, cube: Cube) -> tuple[Cube, tuple[str, ...]]:
         return cube, ()
     low, high = cube.bands.wavelengths[[0, -1]] * 1e9
     note = (
-        f"the file of spectra covers {low:.6g} to {high:.6g} nm; beyond, its light is taken as 0,"
-        f" which is at most {share:.2g} of what this camera sees of white"
+        f"the file of spectra covers {low:.6g} to {high:.6g} nm; beyond, its light is set to 0,"
+        f" which is at most {share:.2g} of this camera's signal of white"
     )
     return replace(cube, bands=replace(cube.bands, dark_beyond=True)), (note,)
 

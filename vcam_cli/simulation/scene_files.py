@@ -298,7 +298,7 @@ def build_scene(
             raise ValueError("a flat source has no layers")
         return build(solved.scene, view, picture, solved.display.primaries)
     if not isinstance(picture, tuple):
-        raise ValueError("layers need what their files hold")
+        raise ValueError("layers depend on their files")
     placed = []
     layers = zip(source.layers, solved.layers, picture, strict=True)
     for layer, alone, files in layers:

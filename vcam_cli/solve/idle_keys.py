@@ -92,7 +92,7 @@ def _is_lit_by_flicker(camera: Camera) -> bool:
 FOLLOW = Rule(
     ("exposure.auto.follow", "pixel.lag"),
     lambda camera: True,
-    "it acts from frame to frame, in sequences alone; take one with --frames 30 --fps 30",
+    "it acts only in sequences, from frame to frame: --frames 30 --fps 30",
 )
 """The rule of single frames: a sequence does not say it."""
 _DETECTOR = "pixel.photodetector"
@@ -107,7 +107,7 @@ RULES = (
     Rule(
         (f"{_CURVE}.corrected",),
         _curve_is_straight,
-        "the transfer curve is a line, and there is nothing to take out",
+        "the transfer curve is a line, and there is nothing to correct",
     ),
     Rule(
         ("exposure.auto.percentile",),
@@ -123,17 +123,17 @@ RULES = (
     Rule(
         ("optics.defocus",),
         lambda camera: camera.optics.focus == "auto",
-        "the autofocus takes it out; write focus: fixed",
+        "the autofocus compensates it; write focus: fixed",
     ),
     Rule(
         ("scene.wavelengths.outside",),
         named_spectra.are_covered,
-        "all spectra cover the wavelengths, or say it themselves",
+        "all spectra cover the wavelengths, or have their own key",
     ),
     Rule(
         ("optics.focus_window",),
         lambda camera: camera.optics.focus == "fixed",
-        "the lens stays as it is; write focus: auto",
+        "the focus is fixed; write focus: auto",
     ),
     Rule(
         ("scene.distance",),
@@ -224,7 +224,7 @@ def idle_keys(camera: Camera) -> Iterator[tuple[str, str]]:
                 yield path, rule.why.replace("ARCHITECTURE", camera.pixel.architecture)
     for path in _process_overrides(camera):
         if _is_probed_idle(camera, path):
-            yield path, "no number of this pixel follows from it; what it gives is given otherwise"
+            yield path, "the file gives all quantities that would follow from it"
 
 
 def notes(camera: Camera) -> tuple[str, ...]:

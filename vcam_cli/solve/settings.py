@@ -8,8 +8,8 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.image_formation.settings import DRAFT, FINE, REFERENCE, STANDARD, Settings
 
 PERCENTILE_SHARE = 0.5
-"""Part of the tolerance for light of which a percentile times the exposure: what that one pixel
-errs, all pixels do."""
+"""Part of the tolerance for light that is metered at a percentile: an error of that one pixel is
+one of all pixels."""
 LADDER = ((0.02, DRAFT), (0.005, STANDARD), (0.001, FINE), (0.0, REFERENCE))
 """Settings for tolerances from the first number of each pair upward."""
 

@@ -204,7 +204,7 @@ class _Planner:
         return lambda findings: float(findings.surface(case, metric).mean[near[0]])
 
     def _is_point(self, key: str) -> bool:
-        """Return whether a case is a single point, of which no place is written."""
+        """Return whether a case is a single point, which needs no place."""
         return self._parameter is None and getattr(self._item, key) is None
 
     def _property(self, key: str) -> Lookup:

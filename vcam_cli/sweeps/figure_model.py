@@ -152,7 +152,7 @@ def _wrong_quantities(
         if CURVES.get(quantity, "") != figure.abscissa:
             other = figure.abscissa or "the parameter"
             message = f"{quantity} is not a function of {other}, as {figure.quantities[0]} is"
-            yield fault(where, message, "make it a figure of its own")
+            yield fault(where, message, "plot it in a separate figure")
         elif quantity not in metrics and quantity not in PROPERTIES | CURVES:
             message = f"{quantity} is not among the metrics: {', '.join(metrics)}"
             yield fault(where, message, "write one of them, or add it to metrics")

@@ -42,7 +42,7 @@ def plan(cameras: StudyCameras) -> tuple[PlannedFigure, ...]:
     for name, figure in study.model.figures.items():
         try:
             planned.append(cameras.figure(name, figure))
-            if not figure.is_rendered:  # refuses cameras of which the closed forms know nothing
+            if not figure.is_rendered:  # refuses cameras without closed forms
                 _content(planned[-1], Findings(cameras.grid, {}), MapCache(1))
         except BadInput as error:
             where = study.locate((FIGURES, name, "show"))

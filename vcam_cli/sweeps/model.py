@@ -166,7 +166,7 @@ class Case(Model):
 
     model_config = Model.model_config | {"extra": "allow"}
     vary: dict[str, Variation] = key(
-        "in place of what the study varies, path by path",
+        "replaces keys that the study varies, by path",
         example={"pixel.width": {"start": "3 um", "stop": "8 um", "count": 20}},
         default=dict,
     )
@@ -270,7 +270,7 @@ class Sweep(Model):
                     yield fault((*place, name), message, "write for example pixel.width")
 
     def _overlaps(self, case: str) -> dict[tuple[str, ...], InitErrorDetails]:
-        """Place -> mistake of keys of which one would set what another's column says."""
+        """Place -> mistake of keys where one would change the value in another's column."""
         own = self.cases[case].vary if case else {}
         varied: dict[str, tuple[str, ...]] = {path: (VARY, path) for path in self.vary}
         varied |= {path: ("cases", case, VARY, path) for path in own}
@@ -309,7 +309,7 @@ def _wrong_expectation(
         yield fault((*place, "quantity"), "the study seeks no optimum", remedy)
     if is_place and (item.at is not None or item.over is not None):
         wrong = "at" if item.at is not None else "over"
-        yield fault((*place, wrong), "an optimum has no place of its own", f"remove {wrong}")
+        yield fault((*place, wrong), "an optimum has no place", f"remove {wrong}")
     if not is_place and item.at is None and study.varies:
         yield fault((*place, "at"), "is missing", "write a value of the parameter, or optimum")
     if item.set and (is_place or is_measured(item.quantity, metrics, item.set)):

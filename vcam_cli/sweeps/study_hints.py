@@ -13,7 +13,7 @@ MOST_COUNTS = 100
 """Longest list of numbers that is written out."""
 _RANGE = re.compile(r"(.+?)(?:\s*(?:\bto\b|\.\.\.?|–|:)\s*|\s+-\s+|(?<=[\da-z])-(?=\d))(.+)")
 _BETTER_LARGE = ("snr", "psnr", "range", "iso", "capacity")
-"""Parts of names of metrics of which the most is sought."""
+"""Parts of names of metrics to maximize."""
 _SENSOR = {
     "full_well": "well_capacity", "well": "well_capacity", "noise": "read_noise",
     "max": "max_time", "time": "max_time", "exposure_time": "max_time",

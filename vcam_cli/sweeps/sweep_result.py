@@ -1,6 +1,6 @@
 """What a sweep found: made of its outcomes, or read back from the folder of a finished sweep.
 
-A finished sweep of which nothing has changed is read, not made again. What is asked, each file that
+A finished sweep is read, not made again, if nothing has changed. What is asked, each file that
 was read and each that was written are compared by their hashes, as `make` would by their times. A
 sweep records what was asked only where another run would find nothing to do: no point or figure
 missing, none that might end otherwise tomorrow.

@@ -136,7 +136,7 @@ _KINDS = {
 
 def _read_exr(path: Path, source: Any) -> Array:
     if source.seek_subimage(1, 0):
-        raise UnusableFile("is an EXR of several parts", "save each frame as a file of its own")
+        raise UnusableFile("is an EXR of several parts", "save each frame as a separate file")
     try:
         channels, _ = read_exr(path)
     except BadInput as error:

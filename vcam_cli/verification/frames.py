@@ -29,7 +29,7 @@ LEAST_OUTLIER = 0.02
 LEAST_SIDE = 4
 """Rows and columns of a color that statistics of rows and columns need."""
 SPREAD = 0.5
-"""Standard deviation of codes from which two frames are never alike by chance [DN]."""
+"""Standard deviation of codes from which two frames are never equal by coincidence [DN]."""
 _FORMATS = "give TIFF, PNG, PGM, npy, EXR, DNG or other raw files of cameras"
 
 
@@ -103,8 +103,8 @@ def paths(
         least = 1 if held_out or is_edge else 2
         if len(found[number]) < least:
             message = (
-                f"{len(files)} files in {folder} are {entry.files}: {len(listed)} frames, of which"
-                f" {kept} are not held out"
+                f"{len(files)} files in {folder} are {entry.files}: {len(listed)} frames, and"
+                f" {kept} of them are not held out"
             )
             problems.add(where, message, f"give {least} frames or more that are not held out")
     raise_if_any(problems, measurement)
@@ -159,7 +159,7 @@ def numbered_stacks(
             for mark in _marks(page, frame):
                 other = seen.setdefault(mark, page)
                 if other is not page:
-                    message = f"{page.name} is a copy of {other.name}: no frame of its own"
+                    message = f"{page.name} is a copy of {other.name}: not an independent frame"
                     raise _refusal(measurement, number, message, "list every frame once")
             frames.append(frame)
         stack = _without_outliers(entry, measurement.label(number), listed, np.stack(frames))

@@ -30,7 +30,7 @@ Points = list[tuple[int, Point]]
 
 @dataclass(frozen=True)
 class Taken:
-    """Frames of an entry, of which the noise is judged."""
+    """Frames of an entry, for tests of their noise."""
 
     number: int
     """Of the entry."""

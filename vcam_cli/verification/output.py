@@ -37,6 +37,6 @@ def report_arguments(found: Verification) -> dict[str, Any]:
         "verify.csv": "Measured values beside predictions of the camera file.",
         "errors.png": "Histogram of prediction errors",
     }
-    about = "Mean signals under even light of known irradiance, predicted from a camera file."
+    about = "Mean signals in uniform light of known irradiance, predicted from a camera file."
     title = f"{found.measurement.name} against {found.camera.name}"
     return {"title": title, "about": about, "facts": cards, "captions": captions}

@@ -17,7 +17,7 @@ from vcam_cli.verification.stack_prediction import Judged
 
 SURE = 1.30
 """Student's t of 39 degrees of freedom that nine in ten are below: an error whose deviation is
-beyond the bound by this is found nine times in ten."""
+beyond the bound by this is found in 90 % of tests."""
 MAIN = (
     *("temporal variance of pixels", "width of 50% of the temporal noise"),
     *("spatial variance of pixels", "width of 50% of the pattern of pixels"),
@@ -48,7 +48,7 @@ class Pooled:
         return next((kind for kind in MAIN if self.judged.name.startswith(kind)), "")
 
     def least_error(self, bound: float) -> float:
-        """Return the relative error that is found nine times in ten; inf where none is."""
+        """Return the relative error that is found in 90 % of tests; inf where none is."""
         return 0.01 * (bound + SURE) / self.one_percent if self.one_percent else math.inf
 
 

@@ -1,16 +1,16 @@
-"""Stacks of frames that a camera file predicts, and whether a measured one could be among them.
+"""Stacks of frames that a camera file predicts, and a test of a measured stack against them.
 
-The camera takes the stack again and again, each time as another sensor with other noise. Where the
-file is right, the measured stack is one more of these, so that the difference of a quantity from
+The camera takes the stack again and again, each time as another sensor with other noise. If the
+file is correct, the measured stack is one more of these, so the difference of a quantity from
 their mean, over their standard deviation and (1 + 1/R)^1/2 of R stacks, is a number of Student's
 distribution of R - 1 degrees of freedom: a test that is exact for normal quantities, whatever
-their errors are. It is applied at 1 % for all quantities together (Bonferroni), so that of a
-hundred right camera files one is said to differ.
+their errors are. It is applied at 1 % for all quantities together (Bonferroni), so one of a
+hundred correct camera files has a significant quantity.
 
 References
 ----------
 .. [1] W. S. Gosset ("Student"), The probable error of a mean, Biometrika 6, 1908.
-.. [2] EMVA Standard 1288, Release 4.0 Linear, 2021, on what the quantities are.
+.. [2] EMVA Standard 1288, Release 4.0 Linear, 2021: definitions of the quantities.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from vcam_cli.verification.stack_quantities import Quantity
 STACKS = 40
 """Number of stacks that are predicted."""
 FALSE_ALARMS = 0.01
-"""Share of right camera files of which any quantity is said to differ."""
+"""Share of correct camera files with any significant quantity."""
 LEAST_DEVIATION = 1e-9
 """Least standard deviation of a quantity, relative to its mean: rounding."""
 COUNT_DEVIATION = 0.5

@@ -28,7 +28,7 @@ OUTLIER = 6.0
 BLOCK = 8
 """Pixels along the blocks whose means tell slow differences over the array."""
 LEAST_VARIANCE = 1e-6
-"""The least variance of which a logarithm is taken [DN^2]."""
+"""Lower limit of variances before their logarithm [DN^2]."""
 
 
 @dataclass(frozen=True)

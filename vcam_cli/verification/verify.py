@@ -57,17 +57,17 @@ class Row:
 
     @property
     def differs(self) -> bool:
-        """Whether the difference is more than chance; unknown counts as yes."""
+        """Whether the difference is significant; unknown counts as yes."""
         return self.deviation is None or self.bound is None or abs(self.deviation) > self.bound
 
     @property
     def missed(self) -> bool:
-        """Whether the error is larger than its tolerance, and more than chance."""
+        """Whether the error is significant and exceeds its tolerance."""
         return self.tolerance is not None and abs(self.error) > self.tolerance and self.differs
 
     @property
     def verdict(self) -> str:
-        """missed, differs (more than chance), agrees; "" where nothing is known of chance."""
+        """missed, differs (significant), agrees; "" without a test of significance."""
         if self.missed:
             return "missed"
         return "" if self.deviation is None else "differs" if self.differs else "agrees"
@@ -90,7 +90,7 @@ class Verification:
     rows: tuple[Row, ...]
     notes: tuple[str, ...]
     least_errors: dict[str, float] = field(default_factory=dict)
-    """Kind of variance and frames -> relative error that is found nine times in ten."""
+    """Kind of variance and frames -> relative error that is found in 90 % of tests."""
 
     @property
     def errors(self) -> Array:
@@ -106,7 +106,7 @@ class Verification:
 
     @property
     def judged(self) -> tuple[Row, ...]:
-        """The rows of which it is known what is chance."""
+        """The rows with a test of significance."""
         return tuple(row for row in self.rows if row.deviation is not None)
 
     def summary(self) -> dict[str, float | int]:

@@ -41,7 +41,7 @@ class Circuit:
     readout_gain: float
     """Gain of the fixed readout chain."""
     exposure_gain: float
-    """Gain in front of the ADC, of which its full scale knows nothing."""
+    """Gain in front of the ADC; the ADC's full scale does not depend on it."""
     bits: int
     """Resolution of the ADC."""
     curve: Curve | None = None

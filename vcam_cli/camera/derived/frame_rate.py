@@ -72,7 +72,7 @@ def frame_rate(camera: CameraModel) -> FrameRate | None:
     needed = "pixel_time" if name == "dps" else "row_time"
     if getattr(given, needed) is None:
         example = "20 ns" if name == "dps" else "10 us"
-        message = f"is missing: it takes most of the readout of {article(name)} {name}"
+        message = f"is missing: it is most of the readout time of {article(name)} {name}"
         raise bad(f"{PATH}.{needed}", message, f"add {needed}: {example}")
     rows, columns = _read(camera)
     at_output = columns * (given.pixel_time or 0.0) / given.outputs

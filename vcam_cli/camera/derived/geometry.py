@@ -322,7 +322,7 @@ def _scene_width(camera: CameraModel, scale: float) -> float | None:
     if not isinstance(extent, Extent):
         return None
     if not camera.optics.is_lens:
-        message = "a bare sensor sees its scene on its own plane, where the scene covers it"
+        message = "a bare sensor has no lens: the scene lies in its plane and covers it"
         raise bad("scene.extent", message, "use extent: sensor")
     if scale == 0:
         raise bad(

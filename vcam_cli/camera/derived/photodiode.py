@@ -88,7 +88,7 @@ def _unusual_dark_current(camera: CameraModel) -> tuple[str, ...]:
         f"the equation of the junction gives {1e5 * density:.4g} nA/cm2 of dark current, and"
         f" photodetectors of the kind {own.kind} have mostly less than {1e5 * usual:.2g} nA/cm2 at"
         f" {ROOM_TEMPERATURE:.0f} K: the junction's lifetimes may belong to another process;"
-        " give dark_current_density as a number to use what was measured",
+        " give a measured dark_current_density as a number",
     )
 
 

@@ -17,7 +17,7 @@ Seed = Annotated[int, Whole(least=0, most=2**63 - 1, example="1")]
 class Chart(MovingSource):
     """A test chart: reflectances between 0 and 1, computed and not read from a file."""
 
-    kind: Literal["chart"] = key("what kind of source this is", example="chart")
+    kind: Literal["chart"] = key("kind of source", example="chart")
     motion: MaybeMotion = MOTION
 
 

@@ -67,7 +67,7 @@ class Crop(Model):
 class ImageFile(MovingSource):
     """A picture, read as the reflectance or the radiance of a flat scene."""
 
-    kind: Literal["image"] = key("what kind of source this is", example="image")
+    kind: Literal["image"] = key("kind of source", example="image")
     motion: MaybeMotion = MOTION
     file: File = key("any image file that OpenImageIO reads", example="photo.png")
     encoding: Annotated[str, Choice("auto", "srgb", "linear")] = key(
@@ -149,7 +149,7 @@ class Variables(Model):
 class Hyperspectral(MovingSource):
     """A file of spectra: spectral EXR, ENVI, ISETCam scene, npz, multichannel TIFF."""
 
-    kind: Literal["hyperspectral"] = key("what kind of source this is", example="hyperspectral")
+    kind: Literal["hyperspectral"] = key("kind of source", example="hyperspectral")
     motion: MaybeMotion = MOTION
     file: File = key(
         "radiances or reflectances: a spectral .exr, an ENVI .hdr, an ISETCam .mat, a .npz with "

@@ -105,7 +105,7 @@ class SceneLayer(Model):
     position: Annotated[
         tuple[float, float], Either(_position, list[Annotated[float, _OFFSET]], yaml_form=_lengths)
     ] = key(
-        "of its center from the axis at its distance, right and down",
+        "distance of its center from the axis, right and down, at the layer's own distance",
         unit="m",
         example=["0 m", "0 m"],
         default=(0.0, 0.0),
@@ -120,7 +120,7 @@ class SceneLayer(Model):
             raise refusal(("source", "model"), message, "write model: mallett or reflectance")
         if isinstance(source, ImageFile) and source.depth is not None:
             message = "a layer has one distance"
-            raise refusal(("source", "depth"), message, "remove it, or give the image by itself")
+            raise refusal(("source", "depth"), message, "remove it, or use the image as the source")
         if source.motion is not None:
             message = "a layer has one motion"
             raise refusal(("source", "motion"), message, "write motion beside source")
@@ -144,7 +144,7 @@ def _layers(given: Any) -> tuple[SceneLayer, ...]:
 class Layers(Model):
     """Flat layers at their own distances, nearer before farther ones, each with its defocus."""
 
-    kind: Literal["layers"] = key("what kind of source this is", example="layers")
+    kind: Literal["layers"] = key("kind of source", example="layers")
     layers: Annotated[
         tuple[SceneLayer, ...], Either(_layers, list[SceneLayer], yaml_form=to_yaml)
     ] = key(

@@ -25,7 +25,7 @@ class CorrelatedRowNoise(NoiseSource):
 
     Row k has x_k = r x_(k-1) + sqrt(1 - r^2) z_k of normal numbers z, so that rows n apart have the
     correlation r^n and the power spectrum over f [cycles/row] is rms^2 (1 - r^2) / (1 - 2 r cos(2
-    pi f) + r^2). It adds to `row_noise`, of which all rows are independent.
+    pi f) + r^2). It adds to `row_noise`, which is independent from row to row.
     """
 
     rms: float

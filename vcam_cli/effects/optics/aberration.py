@@ -70,7 +70,7 @@ def check(camera: Camera, geometry: Geometry) -> None:
     if camera.optics.measured_blur and geometry.focus_shift:
         raise bad(
             ("optics", "focus_distance"),
-            "a measured blur is that of what is in focus, and not known at other distances",
+            "a measured blur holds for the distance in focus, and is unknown at others",
             "write psf: none and mtf: none, or put the scene in focus",
         )
     if traced := TracedBlur.from_camera(camera, geometry):

@@ -1,7 +1,7 @@
 """Blur by a lens's measured modulation transfer.
 
 It has both aberrations and diffraction in it, so the effect `diffraction` goes. What is measured
-holds in all directions; a phase is not known from it and taken as 0.
+holds in all directions; its phase is unknown and set to 0.
 """
 
 from __future__ import annotations

@@ -181,7 +181,7 @@ class MeasuredFalloff(NeutralGain):
 
     @cached_property
     def _table(self) -> Array:
-        """Values at equally many distances, of which the nearest is taken.
+        """Values at equally many distances; the nearest one is used.
 
         Why: `np.interp` searches its segment for every pixel, in 64 bits. A value that falls from
         1 to 0 is good to 4e-6.

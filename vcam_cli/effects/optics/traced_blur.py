@@ -40,7 +40,7 @@ FEWEST_PLACES, MOST_PLACES = 5, 9
 PLACES_PER_WAVE = 3.0
 """Further places for each wave by which the rms of the wavefront changes."""
 MOST_CYCLES = 16.0
-"""Frequency times the blur's radius from which nothing is taken to be left: of an evenly filled
+"""Frequency times the blur's radius from which the transfer is 0: of an evenly filled
 disk it is a thousandth."""
 FEWEST_NODES, NODES_PER_CYCLE, MOST_BLUR_CYCLES = 5, 3.0, 4.0
 """Wavelengths at which transfers are computed, and further ones for each cycle by which the blur's

@@ -55,7 +55,7 @@ class Blooming(Overflow):
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
-        return f"{100 * self.share:.3g} % of what wells do not hold goes along the column"
+        return f"{100 * self.share:.3g} % of the excess charge flows along the column"
 
     def mean_error(self, signal: SignalLevels) -> float | None:
         """Return 0 where no signal comes near the well; elsewhere it is not left out."""

@@ -94,8 +94,8 @@ class Coding:
             said += ", at 8 bits"
         if out_of_gamut:
             said += (
-                f"; {out_of_gamut:.2g} of its samples are outside the gamut of Rec. 709: what is"
-                " negative there is taken as 0"
+                f"; {out_of_gamut:.2g} of its samples are outside the gamut of Rec. 709: their"
+                " negative values become 0"
             )
         return said
 
@@ -165,7 +165,7 @@ def _stated(path: Path, kind: str, spec: Any, channels: int) -> tuple[Coding, li
         return Coding(name, (partial(power, _ADOBE_GAMMA),), _matrix(_ADOBE, channels)), []
     notes = []
     if space == _UNCALIBRATED:
-        notes.append("EXIF calls its colors uncalibrated; they are taken as sRGB")
+        notes.append("EXIF calls its colors uncalibrated; they are read as sRGB")
     if is_float:
         notes.append(
             "its floating-point values state no encoding and are read as sRGB; write encoding: "
@@ -184,7 +184,7 @@ def _of_code_points(given: bytes, channels: int) -> tuple[Coding, list[str]]:
     primaries, transfer, *_ = given
     curve = _TRANSFERS.get(transfer)
     if curve is None or (primaries not in _PRIMARIES and channels == 3):
-        said = f"its code points cICP {primaries}, {transfer} are not known here; it is taken as"
+        said = f"its code points cICP {primaries}, {transfer} are unknown; they are read as"
         return SRGB, [f"{said} sRGB"]
     name, places = _PRIMARIES.get(primaries, _PRIMARIES[1])
     said = f"{name}, {curve[0]} (cICP)"
@@ -198,7 +198,7 @@ def _of_profile(data: bytes, spec: Any, channels: int) -> Coding | str:
     try:
         profile = read_profile(data)
     except ValueError as error:
-        return f"{name} {error}; its colors are taken as sRGB"
+        return f"{name} {error}; its colors are read as sRGB"
     if not profile.curves:
         return Coding(name, (decode_srgb,), None, data)
     curves = tuple(decode_srgb if _is_srgb_curve(curve) else curve for curve in profile.curves)

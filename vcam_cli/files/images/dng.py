@@ -230,7 +230,7 @@ def _tags(image: RawImage) -> list[Tag]:
     count = planes[0] if planes else 1
     margin = MARGIN if image.block else 0
     # LibRaw cuts off fractions of BlackLevel. The delta, which other readers add, is at most half
-    # a code, of which LibRaw makes 0: so that it comes to the nearest whole level.
+    # a code, which LibRaw rounds to 0, so that it comes to the nearest whole level.
     level = round(image.black)
     rest = image.black - level
     said: dict[str, Any] = {

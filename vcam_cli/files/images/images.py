@@ -396,7 +396,7 @@ def _decoded(
         )
     if below:
         notes.append(
-            f"{below} of {data.size} values are negative, down to {lowest:.3g}; they are taken as 0"
+            f"{below} of {data.size} values are negative, down to {lowest:.3g}; they become 0"
         )
     return light
 

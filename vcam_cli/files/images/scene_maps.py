@@ -101,7 +101,7 @@ def read_depth(
             )
         if stored.dtype.kind in "ui" and unit == 1.0:
             notes.append(
-                f"{path.name} holds whole numbers, which are taken as meters; for millimeters write"
+                f"{path.name} holds whole numbers, read as meters; for millimeters write"
                 f" depth: {{file: {path.name}, unit: 1 mm}}"
             )
         depth = np.asarray(stored * unit, np.float32)

@@ -265,9 +265,9 @@ def _remarks(
     if below:
         yield (
             f"{below} of {samples} values are negative, down to {lowest / largest:.1%} of the"
-            " largest; they are taken as 0"
+            " largest; they become 0"
         )
     if missing:
-        yield f"{missing} of {samples} values are marked as no data and taken as 0"
+        yield f"{missing} of {samples} values are marked as no data and become 0"
     if stored.quantity == "reflectance" and largest > 1:
         yield f"reflectances go up to {largest:.4g}, more than a perfect white's"

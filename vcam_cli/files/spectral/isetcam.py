@@ -89,7 +89,7 @@ def open_variables(path: Path, names: Variables) -> SpectralData:
     wavelengths = finite_numbers(_real(lengths, wave, _NAME), f"its {wave}")
     check_length(values.shape[2], wavelengths, f"values of {wave}")
     unit = _wavelength_unit(wavelengths, wave)
-    notes = (f"{name} is taken as radiance in W/(sr m2 nm)",) if names.radiance else ()
+    notes = (f"{name} is read as radiance in W/(sr m2 nm)",) if names.radiance else ()
     return SpectralData(
         (values.shape[0], values.shape[1]), wavelengths * unit, quantity, lambda: values,
         GAINS[quantity], notes=notes,

@@ -75,7 +75,7 @@ def margin(
     geometry : Geometry
         Geometry of the array.
     effects : sequence of Effect
-        Effects of the camera, of which the blurs count.
+        Effects of the camera; blurs are used.
     band : tuple of float
         Shortest and longest wavelength [m].
     knobs : Settings

@@ -135,7 +135,7 @@ def _values(
         samples = planes * rows * columns
     elif not scene.is_painted:
         samples = 4 * g.rows * g.columns
-    else:  # painted in bands, of which the terms along x are kept
+    else:  # painted in bands; terms along x are kept
         bands = columns * bands_of_rows(rows, columns)[0].stop * path.workers
         samples = planes * (rows * x.terms + bands)
     evaluated = g.rows * x.folded_terms if y.virtual_pixels is None else 0
@@ -211,7 +211,7 @@ def frame_bytes(
     samples : int, optional
         Samples of one integration, of each color that a pixel has; 0 for a single exposure.
     scattered : int, optional
-        Pixels that fill no rows and columns, of which a picture on a grid is made.
+        Pixels that fill no rows and columns and are interpolated on a grid.
 
     Returns
     -------

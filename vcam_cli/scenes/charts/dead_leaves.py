@@ -359,7 +359,7 @@ def _period_cells(seed: int, mix: tuple[tuple[float, ...], ...], dtype: np.dtype
 def _periodic_averages(plane: Array, edges: Array, axis: int) -> Array:
     """Return averages along an axis of values on the finest cells of one period.
 
-    The edges of what is averaged are in units of the frame's longer side. Light is taken to be even
+    The edges of what is averaged are in units of the frame's longer side. Light is assumed even
     within each cell, so that its running sum is straight.
     """
     period = plane.shape[axis]

@@ -48,7 +48,7 @@ def check(camera: Camera) -> None:
     if not camera.output.isetcam:
         return
     if camera.array.is_scattered:
-        message = "ISETCam knows pixels in rows and columns alone"
+        message = "ISETCam reads only pixels in rows and columns"
         raise bad(_PATH, message, "write isetcam: false")
     if not electrical(camera).has_volts:
         message = "ISETCam's sensors hold volts, which are unknown here"

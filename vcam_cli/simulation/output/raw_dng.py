@@ -88,7 +88,7 @@ def check(camera: Camera) -> None:
         size = f"{len(mosaic.block)} x {len(mosaic.block[0])}"
         message = (
             f"{', '.join(mosaic.colors)} in blocks of {size} pixels are no Bayer mosaic, and"
-            " raw converters read others wrong: LibRaw all of more than 2 x 2, and some of 2 x 2"
+            " raw converters misread others: LibRaw all larger than 2 x 2, and some of 2 x 2"
         )
         raise bad(_PATH, message, _REMEDY)
     added = layout.binning_groups.summed_codes
@@ -293,7 +293,7 @@ def color_matrix(frame: Frame, light: Spectrum) -> Array:
     -------
     ndarray
         Coefficients (3, 3). The light's own XYZ, with Y = 1, gives the camera's colors of it, the
-        largest of which is 1.
+        largest 1.
 
     References
     ----------

@@ -173,7 +173,7 @@ def _plan_text(record: Mapping[str, Any]) -> str:
 
 
 def _plan(record: Mapping[str, Any]) -> Part:
-    head = ("effect", "state", "decided by", "what it does, or why it is off", "contribution",
+    head = ("effect", "state", "decided by", "effect, or reason for skipping it", "contribution",
             "allowed", "share of")  # fmt: skip
     effects = sorted(record["plan"]["effects"], key=lambda e: (e["state"] == "off", e["by"]))
     rows = [
