@@ -40,6 +40,12 @@ def test_a_key_is_told_with_unit_default_and_example():
     every([(key,) for key in hints.index()], check)
 
 
+def test_a_section_lists_its_keys():
+    entry = next(e for e in explain.explanations("pixel.fpn") if e.get("in") == "camera file")
+    assert entry["keys"].startswith("offset_pixel, dsnu, ")
+    assert "keys" not in next(explain.explanations("pixel.temperature"))
+
+
 def test_an_effect_is_told_with_its_source_and_switch():
     def check(effect):
         said = vcam(effect.name).stdout.replace("\n    ", " ")

@@ -120,6 +120,9 @@ def _of_key(where: str, key: Any) -> dict[str, Any]:
         "default": default,
         "example": f"{key.name}: {key.example}",
     }
+    below = [k.name for place, k in _all_keys() if place == where and k.path[:-1] == key.path]
+    if below and key.path[0] != "effects":
+        entry["keys"] = f"{', '.join(dict.fromkeys(below))}; vcam explain {key.dotted}.{below[0]}"
     effects = [effect for effect in _effects().values() if concerns(effect, key)]
     if where == "camera file" and effects and key.path[0] != "effects":
         entry["effect"] = "; ".join(f"{effect.name} ({effect.reference})" for effect in effects)
