@@ -97,6 +97,48 @@ class Processor:
         word = counter_noise.words(keys, name, sample, mean[0].size)
         return counter_noise.poisson(mean, word.reshape(mean.shape))
 
+    def add_normals(self, values: Array, rms: float, keys: Array, name: str, sample: int) -> Array:
+        """Return values (B, ...) plus normal numbers of a standard deviation; it reuses the array."""
+        z = self.normals(keys, name, sample, values[0].size, values.dtype)
+        z *= rms
+        values += z.reshape(values.shape)
+        return values
+
+    def on_line(
+        self,
+        values: Array,
+        most: float,
+        line: tuple[float, float],
+        highest: int,
+        dtype: DTypeLike = None,
+    ) -> Array:
+        """Return min(values, most) on a line, clipped to 0 and a highest level.
+
+        Parameters
+        ----------
+        values : Array
+            Signal, of any shape [electrons].
+        most : float
+            Most that counts [electrons].
+        line : tuple of float
+            Slope [DN/e] and offset [DN].
+        highest : int
+            Highest level [DN].
+        dtype : dtype, optional
+            Type of whole codes; by default levels are not rounded.
+        """
+        kind = values.dtype.type
+        level = np.minimum(values, kind(most)) * kind(line[0])
+        level += kind(line[1])
+        if dtype is None:
+            return np.clip(level, 0, highest, out=level)
+        np.rint(level, out=level)
+        return np.clip(level, 0, highest, out=level).astype(dtype)
+
+    def stacked(self, pictures: Sequence[Any]) -> Array:
+        """Return pictures of one shape as one array (n, ...) of the device."""
+        return self.put(np.stack([np.asarray(picture) for picture in pictures]))
+
     def spectrum(
         self, pictures: Array, mix: Array, shape: tuple[int, int], black: tuple[int, int]
     ) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from functools import lru_cache
 from pathlib import Path
@@ -18,6 +18,8 @@ from vcam_cli.errors import CannotDo
 
 THREADS, MOST_BLOCKS = 256, 1 << 16
 """Threads of a block, and blocks of a kernel: a thread goes on with further elements."""
+PINNED = 1 << 20
+"""Bytes from which copies go through pinned memory."""
 OPTIONS = ("--std=c++17", "--fmad=false")
 """No fused products: sums round as those of NumPy."""
 SOURCE = Path(__file__).parent / "kernels.cu"
@@ -40,12 +42,41 @@ class Cuda(Processor):
 
     def put(self, values: Any, dtype: DTypeLike = None) -> Array:
         """Return values as a contiguous array of the device."""
+        if isinstance(values, np.ndarray) and values.nbytes >= PINNED:
+            staged = self._pinned(values.shape, values.dtype if dtype is None else dtype)
+            staged[...] = values
+            return self._copied(staged)
         array: Array = self._cupy.ascontiguousarray(self._cupy.asarray(values, dtype))
+        return array
+
+    def stacked(self, pictures: Sequence[Any]) -> Array:
+        """Return pictures of one shape as one array (n, ...) of the device."""
+        cupy, first = self._cupy, pictures[0]
+        if any(hasattr(picture, "__cuda_array_interface__") for picture in pictures):
+            array: Array = cupy.stack([cupy.asarray(picture) for picture in pictures])
+            return array
+        staged = self._pinned((len(pictures), *first.shape), np.result_type(*pictures))
+        for target, picture in zip(staged, pictures, strict=True):
+            target[...] = picture
+        return self._copied(staged)
+
+    def _pinned(self, shape: tuple[int, ...], dtype: DTypeLike) -> Array:
+        """Return an array of the processor in memory from which copies are ten times as fast."""
+        import cupyx
+
+        array: Array = cupyx.empty_pinned(shape, dtype)
+        return array
+
+    def _copied(self, staged: Array) -> Array:
+        array: Array = self._cupy.empty(staged.shape, staged.dtype)
+        array.set(staged)  # type: ignore[attr-defined]
+        self._cupy.cuda.get_current_stream().synchronize()  # `staged` is used again
         return array
 
     def get(self, array: Array) -> Array:
         """Return an array of the device as one of NumPy."""
-        host: Array = self._cupy.asnumpy(array)
+        out = self._pinned(array.shape, array.dtype) if array.nbytes >= PINNED else None
+        host: Array = self._cupy.asnumpy(array, out=out)
         return host
 
     def zeros(self, shape: tuple[int, ...], dtype: DTypeLike) -> Array:
@@ -85,11 +116,37 @@ class Cuda(Processor):
         self._draw("poisson", mean, keys, name, sample)
         return mean
 
-    def _draw(self, kernel: str, out: Array, keys: Array, name: str, sample: int) -> None:
+    def add_normals(self, values: Array, rms: float, keys: Array, name: str, sample: int) -> Array:
+        """Return values (B, ...) plus normal numbers of a standard deviation."""
+        values = self._cupy.ascontiguousarray(values)
+        self._draw("add_normals", values, keys, name, sample, np.float64(rms))
+        return values
+
+    def on_line(
+        self,
+        values: Array,
+        most: float,
+        line: tuple[float, float],
+        highest: int,
+        dtype: DTypeLike = None,
+    ) -> Array:
+        """Return min(values, most) on a line, clipped to 0 and a highest level."""
+        values = self._cupy.ascontiguousarray(values)
+        out: Array = self._cupy.empty(values.shape, values.dtype if dtype is None else dtype)
+        kernel = "levels" if dtype is None else f"codes{8 * out.dtype.itemsize}"
+        numbers = (np.float64(number) for number in (most, *line, highest))
+        self._launch(kernel, values.dtype, out.size, values, out, *numbers, np.int64(out.size))
+        return out
+
+    def _draw(
+        self, kernel: str, out: Array, keys: Array, name: str, sample: int, *more: Any
+    ) -> None:
         count, batch = out[0].size, len(out)
         low, high = (np.uint32(word) for word in counter_noise.stream_words(name))
         arguments = (keys, low, high, np.uint32(sample), np.int64(count), np.int64(batch))
-        self._launch(kernel, out.dtype, -(-count // counter_noise.WORDS) * batch, out, *arguments)
+        groups = -(-count // counter_noise.WORDS)
+        # Uniform numbers have 64 bits in both.
+        self._launch(kernel, out.dtype, groups * batch, out, *arguments, *more)
 
     def _launch(self, kernel: str, dtype: np.dtype, elements: int, *arguments: Any) -> None:
         function = _kernels(np.dtype(dtype).itemsize).get_function(kernel)

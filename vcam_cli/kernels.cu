@@ -95,6 +95,20 @@ KERNEL normals(REAL* out, const u64* keys, u32 low, u32 high, u32 sample, i64 co
   }
 }
 
+// Normal numbers times rms are added to values (batch, count).
+KERNEL add_normals(REAL* values, const u64* keys, u32 low, u32 high, u32 sample, i64 count,
+                   i64 batch, double rms) {
+  i64 groups = (count + 3) / 4;
+  REAL factor = (REAL)rms;
+  EACH(i, groups * batch) {
+    i64 frame = i / groups, group = i - frame * groups;
+    u32 word[4];
+    philox(keys[frame], (u32)group, sample, low, high, word);
+    for (int j = 0; j < 4 && 4 * group + j < count; ++j)
+      values[frame * count + 4 * group + j] += (REAL)normal(word[j]) * factor;
+  }
+}
+
 KERNEL uniforms(double* out, const u64* keys, u32 low, u32 high, u32 sample, i64 count, i64 batch) {
   i64 groups = (count + 3) / 4;
   EACH(i, groups * batch) {
@@ -118,6 +132,32 @@ KERNEL poisson(REAL* mean, const u64* keys, u32 low, u32 high, u32 sample, i64 c
       mean[at] = poisson_number(mean[at], word[j]);
     }
   }
+}
+
+// A line and its ends: out = clip(min(values, most) scale + offset, 0, highest), whole for codes.
+FUNCTION REAL on_line(REAL value, REAL most, REAL scale, REAL offset, REAL highest) {
+  REAL level = (value < most ? value : most) * scale + offset;
+  return level < (REAL)0 ? (REAL)0 : level > highest ? highest : level;
+}
+
+KERNEL levels(const REAL* values, REAL* out, double most, double scale, double offset,
+              double highest, i64 count) {
+  EACH(i, count)
+    out[i] = on_line(values[i], (REAL)most, (REAL)scale, (REAL)offset, (REAL)highest);
+}
+
+KERNEL codes16(const REAL* values, unsigned short* out, double most, double scale, double offset,
+               double highest, i64 count) {
+  EACH(i, count)
+    out[i] = (unsigned short)rint(
+        on_line(values[i], (REAL)most, (REAL)scale, (REAL)offset, (REAL)highest));
+}
+
+KERNEL codes32(const REAL* values, u32* out, double most, double scale, double offset,
+               double highest, i64 count) {
+  EACH(i, count)
+    out[i] =
+        (u32)rint(on_line(values[i], (REAL)most, (REAL)scale, (REAL)offset, (REAL)highest));
 }
 
 // A DCT-II of real x is one Fourier transform of its even samples and then its odd ones backwards.

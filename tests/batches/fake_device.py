@@ -106,6 +106,15 @@ class FakeDevice(Processor):
     def poisson(self, keys, name, sample, mean):
         return FakeArray(super().poisson(keys.values, name, sample, mean.values))
 
+    def add_normals(self, values, rms, keys, name, sample):
+        z = Processor.normals(self, keys.values, name, sample, values[0].size, values.dtype)
+        z *= rms
+        values += FakeArray(z.reshape(values.shape))
+        return values
+
+    def stacked(self, pictures):
+        return FakeArray(np.stack([p.values if isinstance(p, FakeArray) else p for p in pictures]))
+
     def spectrum(self, pictures, mix, shape, black):
         return FakeArray(super().spectrum(pictures.values, mix.values, shape, black))
 

@@ -51,9 +51,9 @@ def resolved(monkeypatch):
     times = []
     grid = sweep_points.grid
 
-    def counted(*args):
+    def counted(*args, **options):
         times.append(args)
-        return grid(*args)
+        return grid(*args, **options)
 
     monkeypatch.setattr(sweep_points, "grid", counted)
     return times

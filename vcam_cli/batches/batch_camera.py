@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -12,13 +13,12 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.backend import Processor
 from vcam_cli.effects.base import Effect
-from vcam_cli.effects.noise.companding import CompandedQuantization
-from vcam_cli.effects.noise.quantization import CurvedQuantization
 from vcam_cli.effects.signal_chain import electron_effects, full_well
 from vcam_cli.errors import CannotDo
 from vcam_cli.readout import exposure
 from vcam_cli.readout.batched_sites import SensorMaps, sites
 from vcam_cli.readout.chain import ReadoutChain
+from vcam_cli.readout.device_capture import require_linear
 from vcam_cli.simulation.frame import pedestal
 from vcam_cli.solve.solved import Solved
 
@@ -96,12 +96,21 @@ class BatchCamera:
         here = sites(self.maps, seeds, exposure.mean_dark(time, effects))
         in_front = electron_effects(effects, behind_well=False)
         held = exposure.mean_electrons(rates, time, effects)
-        well = held.dtype.type(full_well(effects))
-        clean = camera.chain.clipped(camera.chain.to_dn(np.minimum(held, well)))
-        tile = exposure.mean_charge(rates, time, effects, here)
-        tile = exposure.in_wells(tile, in_front, here)
+        clean = self._levels(held, camera)
+        tile = exposure.in_wells(exposure.lifted(held, effects, here), in_front, here)
+        kind = exposure.codes_type(adc.bits)
+        behind = electron_effects(effects, behind_well=True)
+        if adc.line is not None and camera.pedestal is None and not behind:
+            return self.device.on_line(tile, math.inf, adc.line, adc.highest_code, kind), clean
         codes = exposure.codes(tile, effects, adc, here, camera.pedestal)
-        return codes.astype(exposure.codes_type(adc.bits)), clean
+        return codes.astype(kind), clean
+
+    def _levels(self, held: Array, camera: _AtGain) -> Array:
+        """Return the codes of mean signals without rounding [DN]."""
+        adc, well = camera.chain.adc, float(full_well(camera.effects))
+        if adc.line is not None:
+            return self.device.on_line(held, well, adc.line, adc.highest_code)
+        return camera.chain.clipped(camera.chain.to_dn(np.minimum(held, held.dtype.type(well))))
 
 
 def refuse_unsupported(solved: Solved, device: Processor) -> None:
@@ -117,7 +126,6 @@ def refuse_unsupported(solved: Solved, device: Processor) -> None:
     chain, layout = solved.chain, solved.layout
     crosstalk = solved.pixel.crosstalk
     coupled = crosstalk is not None and crosstalk.interpixel_capacitance is not None
-    curved = isinstance(solved.adc, CurvedQuantization | CompandedQuantization)
     for refused, what in (
         (chain.merge is not None, "several readouts of a pixel"),
         (solved.exposure.captures is not None, "several samples of an exposure"),
@@ -126,9 +134,8 @@ def refuse_unsupported(solved: Solved, device: Processor) -> None:
         (layout.is_scattered or layout.planes, "pixels in no rows and columns, or stacked ones"),
         (coupled or bool(solved.pixel.blooming), "interpixel capacitance and blooming"),
         (solved.pixel.phase_detection is not None, "phase detection"),
-        (curved and device.name != "cpu", "a transfer curve or companding"),
     ):
         if refused:
-            raise CannotDo(
-                f"{what}: not computed in batches of frames", "use simulate or --device cpu"
-            )
+            message = f"{what}: not computed in batches of frames"
+            raise CannotDo(message, "use simulate, or --device cpu")
+    require_linear(solved.adc, device)

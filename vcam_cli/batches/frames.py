@@ -182,8 +182,12 @@ def frames(
     with found.errors():
         try:
             yield from _batches(
-                *(camera, _stacks(pictures, max(1, batch // frames_each), camera, crop, places)),
-                *(found, asked, batch, workers),
+                camera,
+                _stacks(pictures, max(1, batch // frames_each), camera, found, crop, places),
+                found,
+                asked,
+                batch,
+                workers,
             )
         except BadInput as error:
             raise error.with_places(camera.locate) from None
@@ -398,6 +402,7 @@ def _stacks(
     pictures: Iterable[Any],
     count: int,
     camera: Camera,
+    device: Processor,
     crop: tuple[int, int] | None,
     places: Sequence[tuple[int, int]] | Callable[[int], tuple[int, int]] | None,
 ) -> Iterator[Any]:
@@ -421,29 +426,25 @@ def _stacks(
             if crop is None:
                 yield some
             else:
-                yield _stacked([window(p, start + n) for n, p in enumerate(some)])
+                yield _stacked([window(p, start + n) for n, p in enumerate(some)], device)
         return
     number, held = 0, []
     for picture in _read_ahead(pictures, camera, count):
         held.append(window(picture, number))
         number += 1
         if len(held) == count:
-            yield _stacked(held)
+            yield _stacked(held, device)
             held = []
     if held:
-        yield _stacked(held)
+        yield _stacked(held, device)
 
 
-def _stacked(pictures: Sequence[Any]) -> Any:
+def _stacked(pictures: Sequence[Any], device: Processor) -> Any:
     """Return pictures of one shape as an array (n, rows, columns, channels)."""
     shaped = [p if p.ndim == 3 else p[:, :, None] for p in pictures]
     if len({p.shape for p in shaped}) > 1:
         raise ValueError("pictures differ in shape; write one shape, or crop")
-    if any(hasattr(p, "__cuda_array_interface__") for p in shaped):
-        import cupy
-
-        return cupy.stack([cupy.asarray(p) for p in shaped])
-    return np.stack([np.asarray(p) for p in shaped])
+    return device.stacked(shaped)
 
 
 def _read_ahead(pictures: Iterable[Any], camera: Camera, count: int) -> Iterator[Any]:

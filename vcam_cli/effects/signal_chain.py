@@ -100,6 +100,28 @@ class Site:
         """
         return noise.poisson_from_normal(mean, self.normal(name))
 
+    def add_normal(self, name: str, electrons: Array, rms: float) -> Array:
+        """Return a block plus one normal number a pixel; it reuses the array.
+
+        Parameters
+        ----------
+        name : str
+            Name of the stream.
+        electrons : Array
+            Block (rows, columns) [electrons].
+        rms : float
+            Standard deviation [electrons].
+
+        Returns
+        -------
+        Array
+            Block (rows, columns) [electrons].
+        """
+        z = self.normal(name)
+        z *= rms
+        electrons += z
+        return electrons
+
     def uniform(self, name: str) -> Array:
         """Return one number between 0 and 1 a pixel (rows, columns), in 64 bits.
 
@@ -495,6 +517,11 @@ class Quantizer(Effect):
     bits: int
     on_device: ClassVar[bool] = True
     """Whether `apply` takes arrays of a graphics processor."""
+
+    @property
+    def line(self) -> tuple[float, float] | None:
+        """Slope [DN/e] and offset [DN] of an ADC that is a line; None for another."""
+        return None
 
     @property
     def highest_code(self) -> int:

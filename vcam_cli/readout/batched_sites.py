@@ -90,6 +90,11 @@ class SensorSite(Site):
         """Return one standard normal number a pixel (rows, columns)."""
         return self.maps.get(name, lambda site: site.normal(name)).copy()
 
+    def add_normal(self, name: str, electrons: Array, rms: float) -> Array:
+        """Return frames plus one normal number a pixel, the same in all."""
+        electrons += self.maps.get(name, lambda site: site.normal(name)) * self.dtype(rms)
+        return electrons
+
     def uniform(self, name: str) -> Array:
         """Return one number between 0 and 1 a pixel (rows, columns)."""
         return self.maps.get(name, lambda site: site.uniform(name))
@@ -145,6 +150,11 @@ class FrameSite(SensorSite):
 
     def _normals(self, name: str, count: int) -> Array:
         return self.maps.device.normals(self.keys, name, self.sample, count, self.dtype)
+
+    def add_normal(self, name: str, electrons: Array, rms: float) -> Array:
+        """Return frames (B, rows, columns) plus one normal number a pixel."""
+        device = self.maps.device
+        return device.add_normals(electrons, float(rms), self.keys, name, self.sample)
 
     def poisson(self, name: str, mean: Array) -> Array:
         """Return Poisson numbers of means (B, rows, columns) [electrons]."""

@@ -346,10 +346,29 @@ def mean_charge(
     Array
         Mean signal in the shape and float type of the rate [electrons].
     """
-    tile = mean_electrons(rate, time, effects)
+    return lifted(mean_electrons(rate, time, effects), effects, here)
+
+
+def lifted(mean: Array, effects: tuple[Effect, ...], here: Mapping[str, Site]) -> Array:
+    """Return mean signals with dark currents of pixels and defects in them.
+
+    Parameters
+    ----------
+    mean : Array
+        Mean signal (..., rows, columns); it may be reused [electrons].
+    effects : tuple of Effect
+        Effects that run, in the order of action.
+    here : mapping
+        Site of each scope.
+
+    Returns
+    -------
+    Array
+        Mean signal in the same shape [electrons].
+    """
     for source in of_kind(effects, NoiseSource):
-        tile = source.before_shot(tile, here[source.scope])
-    return tile
+        mean = source.before_shot(mean, here[source.scope])
+    return mean
 
 
 def _at_rows(opened: Mapping[str, Site], rows: slice) -> dict[str, Site]:

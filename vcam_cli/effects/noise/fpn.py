@@ -163,9 +163,7 @@ class FixedPattern(NoiseSource):
                 gain = g
             electrons *= gain
         if self.offset_pixel:
-            z = site.normal("fpn offset pixel")
-            z *= self.offset_pixel
-            electrons += z
+            electrons = site.add_normal("fpn offset pixel", electrons, self.offset_pixel)
         if self.offset_column:
             electrons += self.offset_column * site.normal_columns("fpn offset column")
         return electrons

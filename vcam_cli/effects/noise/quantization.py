@@ -74,6 +74,11 @@ class Quantization(Quantizer):
         """Return a short clause with this camera's numbers and units."""
         return f"{self.electrons_per_dn:.4g} e per step, {2**self.bits} codes"
 
+    @property
+    def line(self) -> tuple[float, float]:
+        """Slope [DN/e] and offset [DN]."""
+        return 1 / self.electrons_per_dn, self.offset
+
     def response(self, electrons: Array) -> Array:
         """Return the codes before rounding and clipping [DN]."""
         return electrons * (1 / self.electrons_per_dn) + self.offset

@@ -74,9 +74,7 @@ class ReadNoise(NoiseSource):
     def apply(self, electrons: Array, site: Site) -> Array:
         """Return the block with the noise of one readout in it; it reuses the array [electrons]."""
         if self.electrons:
-            z = site.normal(self.name)
-            z *= self.electrons
-            electrons += z
+            electrons = site.add_normal(self.name, electrons, self.electrons)
         if self.column:
             electrons += self.column * site.normal_columns("read_noise column")
         if self.row:

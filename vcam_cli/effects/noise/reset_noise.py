@@ -51,10 +51,7 @@ class ResetNoise(NoiseSource):
 
     def apply(self, electrons: Array, site: Site) -> Array:
         """Return the block with the noise of a reset in it; it reuses the array [electrons]."""
-        z = site.normal(self.name)
-        z *= self.electrons
-        electrons += z
-        return electrons
+        return site.add_normal(self.name, electrons, self.electrons)
 
     def variance(self, mean: float, dark: float = 0.0) -> float:
         """Return the variance that it adds to a pixel [electrons squared]."""
