@@ -156,6 +156,7 @@ def dataset(
     fresh: bool = False,
     watch: Watch = None,
     tell: Callable[[str], None] | None = None,
+    device: str = "cpu",
 ) -> DatasetResult:
     """Write the labeled frames of a data set into `out`, default out/NAME: `vcam dataset`.
 
@@ -168,7 +169,7 @@ def dataset(
     require_name(study, "study")
     require_overrides(sets)
     share = Share(*shard) if shard else None
-    execution = Execution(share, _threads(workers), scheduler, fresh)
+    execution = Execution(share, _threads(workers), scheduler, fresh, device)
     file = dataset_file.read(study, sets, seed, accuracy)
     place = Path("out") / file.model.name if out is None else require_folder(out)
     return work.dataset(file, place, execution, observer(watch), tell)

@@ -241,7 +241,7 @@ def _batches(
         assert taker is not None and light is not None
         count = len(stack) * asked.frames_each
         _require(device, light, taker, len(stack), shape, min(count, max(batch, asked.frames_each)))
-        rates = own_float_errors(light.rates)(_linear(stack, device, camera))
+        rates = own_float_errors(light.rates)(linear_pictures(stack, device, camera))
         for start in range(0, count, max(batch, 1)):
             numbers = range(first + start, first + min(start + batch, count))
             shown = [(number - first) // asked.frames_each for number in numbers]
@@ -341,14 +341,14 @@ def _taken(
 ) -> FrameBatch:
     """Return some frames of pictures whose light is known."""
     solved, device = taker.solved, taker.device
-    metered = {
-        picture: _metered(solved, rates[picture], white)
+    chosen = {
+        picture: metered(solved, rates[picture], white)
         for picture in (set(shown) if solved.exposure.auto is not None else ())
     }
     times, gains = list[float](), list[float]()
     for number, picture in zip(numbers, shown, strict=True):
         time, gain = asked.number(asked.times, number), asked.number(asked.gains, number)
-        own = metered.get(picture, (solved.exposure.time or 0.0, solved.gain))
+        own = chosen.get(picture, (solved.exposure.time or 0.0, solved.gain))
         times.append(own[0] if time is None else time)
         gains.append(own[1] if gain is None else gain)
     seeds = tuple(asked.seed(solved.seed.frame, number) for number in numbers)
@@ -380,8 +380,25 @@ def _taken(
     )
 
 
-def _metered(solved: Solved, rate: Array, white: float) -> tuple[float, float]:
-    """Return time [s] and gain that a camera chooses for the light of a picture [e/s]."""
+def metered(solved: Solved, rate: Array, white: float) -> tuple[float, float]:
+    """Return time and gain that a camera chooses for the light of a picture.
+
+    Parameters
+    ----------
+    solved : Solved
+        The camera.
+    rate : Array
+        Photo-electrons per second (rows, columns) [e/s].
+    white : float
+        Rate of the perfect white in its brightest color [e/s].
+
+    Returns
+    -------
+    time : float
+        Exposure time [s].
+    gain : float
+        Analog gain.
+    """
     dark = exposure.mean_dark(1.0, solved.effects.enabled)
     chosen = auto_exposure.exposure_settings(
         solved.limited_exposure, rate, white, dark, solved.chain.metered
@@ -471,8 +488,18 @@ def _read_ahead(pictures: Iterable[Any], camera: Camera, count: int) -> Iterator
             waiting += [pool.submit(read, picture) for picture in islice(coming, 1)]
 
 
-def _linear(stack: Any, device: Processor, camera: Camera) -> Array:
-    """Return pictures in linear light on the device, 1 = white."""
+def linear_pictures(stack: Any, device: Processor, camera: Camera) -> Array:
+    """Return pictures in linear light on the device, 1 = white.
+
+    Parameters
+    ----------
+    stack : array
+        Pictures (n, rows, columns, channels), of the processor or of the device.
+    device : Processor
+        The device.
+    camera : Camera
+        Its scene's source says white and encoding.
+    """
     source = camera.scene.source
     white = source.white if isinstance(source, ImageFile) else 1.0
     values = device.put(stack)

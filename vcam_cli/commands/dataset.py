@@ -25,6 +25,7 @@ def dataset(
     scheduler: Scheduler = None,
     shard: Shard = None,
     fresh: Fresh = False,
+    device: options.Device = "cpu",
 ) -> None:
     """Write frames of a camera with random parameters, and their labels.
 
@@ -55,6 +56,7 @@ def dataset(
                     fresh,
                     progress,
                     lambda message: options.say(message, quiet),
+                    device,
                 )
         except KeyboardInterrupt as error:
             options.say("interrupted; finished frames are kept, and the same command continues")

@@ -14,8 +14,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from vcam_cli import backend
 from vcam_cli.datasets import manifest
 from vcam_cli.datasets.dataset_file import DatasetFile
+from vcam_cli.datasets.device_frames import batches_of, compute_batches
 from vcam_cli.datasets.drawing import Frame
 from vcam_cli.datasets.frame_work import NPZ, FrameJob
 from vcam_cli.datasets.shards import Packer, Shard, scale, shards
@@ -77,7 +79,7 @@ def dataset(
     watch, tell = watch or Silent(), tell or (lambda _: None)
     watch.begin("frames")
     versions = {name: found for name, found in provenance.versions().items() if name in LIBRARIES}
-    ids = frame_ids(file)
+    ids = frame_ids(file, execution.device)
     whole = shards(file.model.frames, file.model.shards, ids)
     mine = _of_share(whole, execution)
     with SweepFolder(out, RECORD) as folder:
@@ -87,11 +89,14 @@ def dataset(
         for shard in mine:
             if not execution.fresh and packer.files(shard) is not None:
                 points.packed.update(shard.ids)
-        groups = _groups(file, mine, ids, points, versions)
-        computed = compute(groups, points, execution, watch, tell, "frames")
+        groups = _groups(file, mine, ids, points, versions, execution.device)
+        if execution.device == "cpu":
+            computed = compute(groups, points, execution, watch, tell, "frames")
+        else:
+            computed = _compute_on_device(groups, points, execution, watch, tell)
         with folder.summarizing():
             found, there = _pack_all(packer, points, whole)
-            record = _record(file, versions) | {"packed": len(found)}
+            record = _record(file, versions, execution.device) | {"packed": len(found)}
             table = partial(manifest.write, file, packer, found)
             folder.finish({MANIFEST: table}, record, file.inputs, there=there)
             failed = manifest.failures(packer, found) + len(points.unfinished)
@@ -108,13 +113,14 @@ def dataset(
     )
 
 
-def frame_ids(file: DatasetFile) -> list[str]:
+def frame_ids(file: DatasetFile, device: str = "cpu") -> list[str]:
     """Return the hash of every frame: of all that its arrays depend on, wherever files lie."""
     form = file.camera.model_dump(mode="json")
     for name in ("name", "quality", "expect", "output", "seed"):
         form.pop(name, None)
     form["sensor"] = file.camera.seed.sensor
-    content = hash_of(file.camera, form, {"write": sorted(file.model.write)})
+    asked = {"write": sorted(file.model.write)} | ({} if device == "cpu" else {"device": device})
+    content = hash_of(file.camera, form, asked)
     hashes = {s.file: hash_file(s.file) for s in file.scenes if s.file is not None}
 
     def plain(frame: Frame) -> dict[str, Any]:
@@ -184,7 +190,12 @@ class _Frames:
 
 
 def _groups(
-    file: DatasetFile, mine: list[Shard], ids: list[str], points: _Frames, versions: dict[str, str]
+    file: DatasetFile,
+    mine: list[Shard],
+    ids: list[str],
+    points: _Frames,
+    versions: dict[str, str],
+    device: str,
 ) -> list[list[FrameJob]]:
     """Return the frames that are not packed; those of one picture together, it is read once."""
     groups: dict[Any, list[FrameJob]] = defaultdict(list)
@@ -194,9 +205,31 @@ def _groups(
                 continue
             frame = file.frame(number)
             scene = None if frame.scene is None else (frame.scene.name, str(frame.scene.file))
-            job = FrameJob(ids[number], frame, file.base, file.model.write, versions)
+            job = FrameJob(ids[number], frame, file.base, file.model.write, versions, device)
             groups[scene].append(job)
     return list(groups.values())
+
+
+def _compute_on_device(
+    groups: list[list[FrameJob]],
+    points: _Frames,
+    execution: Execution,
+    watch: Observer,
+    tell: Callable[[str], None],
+) -> int:
+    """Compute frames in batches on a device, and those that batches do not compute one by one."""
+    device = backend.device(execution.device)
+    cameras, others = batches_of(groups)
+    total, computed = sum(len(jobs) for jobs in cameras), 0
+    for jobs in cameras:
+        for outcome in compute_batches(jobs, device, lambda job: points.ask(job) == "compute"):
+            points.keep(outcome)
+            computed += 1
+            watch.step(computed, total)
+    if others:
+        tell(f"{len(others)} frames take their light from the processor, one by one")
+        computed += compute([others], points, execution, watch, tell, "frames")
+    return computed
 
 
 def _pack_all(
@@ -216,7 +249,7 @@ def _pack_all(
     return found, there
 
 
-def _record(file: DatasetFile, versions: dict[str, str]) -> dict[str, Any]:
+def _record(file: DatasetFile, versions: dict[str, str], device: str) -> dict[str, Any]:
     model = file.model
     whole = {"npz": "shard_NNNN.npz: members FRAME.KIND", "tiff": "shard_NNNN/FRAME_KIND.tif"}
     return {
@@ -230,4 +263,5 @@ def _record(file: DatasetFile, versions: dict[str, str]) -> dict[str, Any]:
             kind: 1 if model.format == "npz" else scale(kind, _scale(file)) for kind in model.write
         },
         "versions": versions,
+        "device": backend.device(device).describe() if device != "cpu" else device,
     }

@@ -11,13 +11,16 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.config.document import Document
 from vcam_cli.datasets.drawing import Frame
-from vcam_cli.effects.base import of_kind
+from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.signal_chain import NoiseSource
 from vcam_cli.files.frame_archive import archive_bytes
 from vcam_cli.image_formation.rate_cache import RateCache
 from vcam_cli.quality.photon_transfer import ROUNDING
+from vcam_cli.readout.chain import ReadoutChain
+from vcam_cli.readout.exposure import mean_dark
 from vcam_cli.simulation.shared import Shared
 from vcam_cli.simulation.simulate import Result, simulate
+from vcam_cli.solve.solved import Solved
 from vcam_cli.sweeps.point_effects import with_every_effect
 
 LIGHT = 1 << 24
@@ -43,6 +46,7 @@ class FrameJob:
     """The data set's camera file."""
     write: tuple[str, ...]
     versions: dict[str, str]
+    device: str = "cpu"
 
     def compute(self, threads: int, shared: Shared) -> tuple[dict[str, float], dict[str, bytes]]:
         """Return the labels of the frame, and the archive of its arrays."""
@@ -51,7 +55,10 @@ class FrameJob:
         camera = with_every_effect(self.frame.camera(self.base))
         output = camera.output.model_copy(update={"render": None})
         result = simulate(
-            camera.model_copy(update={"output": output, "quality": ()}), threads, shared=shared
+            camera.model_copy(update={"output": output, "quality": ()}),
+            threads,
+            shared=shared,
+            device=self.device,
         )
         arrays = {kind: ARRAYS[kind](result) for kind in self.write}
         return labels(result), {NPZ: archive_bytes(arrays)}
@@ -63,26 +70,35 @@ def labels(result: Result) -> dict[str, float]:
     The temporal variance of a pixel is dark_variance + system_gain (clean - black_level), as long
     as it does not saturate and its signal chain is linear.
     """
-    frame, circuit = result.frame, result.frame.electrical
-    gain = frame.chain.system_gain
-    dark = frame.dark_rate * frame.exposure_time
-    sources = of_kind(frame.plan.active, NoiseSource)
+    frame = result.frame
+    return noise_labels(
+        frame.solved, frame.chain, frame.plan.active, frame.exposure_time, result.dn
+    )
+
+
+def noise_labels(
+    solved: Solved, chain: ReadoutChain, effects: tuple[Effect, ...], time: float, dn: Array
+) -> dict[str, float]:
+    """Return the labels of a frame that a camera at its gain took in a time [s]; dn: its codes."""
+    circuit, gain = solved.electrical, chain.system_gain
+    dark = mean_dark(time, effects)
+    sources = of_kind(effects, NoiseSource)
     rms = {f"{source.name} [e]": source.variance(dark, dark) ** 0.5 for source in sources}
     temporal = sum(s.variance(dark, dark) for s in sources if s.scope == "frame")
-    fpn = frame.solved.pixel.fpn
+    fpn = solved.pixel.fpn
     return {
-        "exposure_time [s]": frame.exposure_time,
+        "exposure_time [s]": time,
         "exposure_gain": circuit.exposure_gain,
         "system_gain [DN/e]": gain,
-        "black_level [DN]": frame.black_dn,
-        "saturation [DN]": frame.chain.saturated_dn,
+        "black_level [DN]": chain.black_dn(dark),
+        "saturation [DN]": chain.saturated_dn,
         "full_well [e]": circuit.full_well,
         "dark_signal [e]": dark,
         "dark_variance [DN2]": gain**2 * temporal + ROUNDING,
         **rms,
         **{
             f"{what}.{branch.name}{unit}": value
-            for branch in frame.chain.branches
+            for branch in chain.branches
             for what, unit, value in (
                 ("system_gain", " [DN/e]", 1 / branch.circuit.electrons_per_dn),
                 ("offset", " [DN]", branch.circuit.offset),
@@ -91,6 +107,6 @@ def labels(result: Result) -> dict[str, float]:
         },
         "gain_pixel": fpn.gain_pixel or 0.0,
         "gain_column": fpn.gain_column or 0.0,
-        "mean [DN]": float(result.dn.mean(dtype=float)),
-        "saturated_fraction": float(np.mean(result.dn >= frame.chain.saturated_dn)),
+        "mean [DN]": float(dn.mean(dtype=float)),
+        "saturated_fraction": float(np.mean(dn >= chain.saturated_dn)),
     }
