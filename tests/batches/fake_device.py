@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from vcam_cli.backend import Processor
+from vcam_cli.devices.processor import Processor
 
 FUNCTIONS = {
     *("clip", "concatenate", "copyto", "empty_like", "moveaxis", "partition", "prod", "ravel"),

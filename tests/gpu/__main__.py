@@ -17,9 +17,11 @@ from pathlib import Path
 import numpy as np
 
 from tests.gpu.noise_statistics import generator, sources, worst
-from vcam_cli import backend, counter_noise, load, simulate
-from vcam_cli.backend import Processor
+from vcam_cli import load, simulate
 from vcam_cli.batches.frames import frames, ready, solved_for
+from vcam_cli.devices import counter_noise
+from vcam_cli.devices.choice import open_device
+from vcam_cli.devices.processor import Processor, require
 
 MEAN = 1e-5
 """Difference from the processor's mean signal that is allowed, over full signal."""
@@ -148,7 +150,8 @@ def cameras(device: Processor) -> list[Callable[[], str]]:
             rgb, ref = here[0].demosaic(here[0].dn), host[0].demosaic(host[0].dn)
             error_rgb = float(np.abs(device.get(rgb) - ref).max())
             said = f", demosaic {error_rgb:.3g} DN"
-        return f"light on {light.where}, clean {error:.2g}, codes equal {share:.5f}, {apart} apart{said}"
+        equal = f"codes equal {share:.5f}, {apart} apart"
+        return f"light on {light.where}, clean {error:.2g}, {equal}{said}"
 
     return [(name, lambda name=name: one(name)) for name in names]
 
@@ -234,7 +237,7 @@ def too_large(device: Processor) -> str:
 
     free = device.free_memory()
     try:
-        backend.require(device, free + 1, "frames")
+        require(device, free + 1, "frames")
     except CannotDo as error:
         return str(error)
     raise AssertionError("not refused")
@@ -387,7 +390,7 @@ def main() -> int:
     """Run what was asked for."""
     asked = sys.argv[1:] or ["check", "bench"]
     start = time.perf_counter()
-    device = backend.device("gpu")
+    device = open_device("gpu")
     print(device.describe(), f"{device.free_memory() / 1e9:.1f} GB may be used", flush=True)
     if "check" in asked:
         check("words of the kernels", lambda: words(device))

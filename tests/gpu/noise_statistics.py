@@ -7,9 +7,9 @@ import numpy as np
 from scipy import stats
 
 from vcam_cli import load
-from vcam_cli.backend import Processor
 from vcam_cli.batches.batch_camera import BatchCamera
 from vcam_cli.batches.frames import solved_for
+from vcam_cli.devices.processor import Processor
 from vcam_cli.effects.signal_chain import NoiseSource
 from vcam_cli.readout.batched_sites import SensorMaps, sites
 
@@ -85,8 +85,7 @@ def sources(device: Processor, frames: int, side: int) -> Iterator[Row]:
             if repr(effect) in seen:
                 continue
             seen.add(repr(effect))
-            for row in _source(taker, effect, frames, f"{name} {effect.name} {number}"):
-                yield row
+            yield from _source(taker, effect, frames, f"{name} {effect.name} {number}")
 
 
 def _source(taker: BatchCamera, effect: NoiseSource, frames: int, name: str) -> Iterator[Row]:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.backend import Processor
+from vcam_cli.devices.processor import Processor
 from vcam_cli.effects.base import Effect
 from vcam_cli.effects.signal_chain import electron_effects, full_well
 from vcam_cli.errors import CannotDo
@@ -91,7 +91,7 @@ class BatchCamera:
         effects, adc = camera.effects, camera.chain.adc
         time: Any = times[0]
         if any(other != time for other in times):
-            column = np.array(times, self.dtype)[:, None, None]
+            column: Array = np.array(times, self.dtype)[:, None, None]
             time = self.device.put(column)
         here = sites(self.maps, seeds, exposure.mean_dark(time, effects))
         in_front = electron_effects(effects, behind_well=False)

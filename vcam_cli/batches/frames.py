@@ -13,15 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from vcam_cli import backend
 from vcam_cli.accuracy_study.ablation import with_effects
 from vcam_cli.arguments import brief, require_whole
 from vcam_cli.arrays import Array
-from vcam_cli.backend import Processor
 from vcam_cli.batches.batch_camera import BatchCamera, refuse_unsupported
 from vcam_cli.batches.light import DeviceLight, ProcessorLight, pictures_light, seen_by
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.scene.scene_files import ImageFile
+from vcam_cli.devices.choice import open_device
+from vcam_cli.devices.processor import Processor, require
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.pixel_signal import TemporalGain, Transport
 from vcam_cli.effects.signal_chain import noise_sources
@@ -36,7 +36,8 @@ from vcam_cli.simulation.checks import read_lens
 from vcam_cli.solve.solved import Solved, solve
 
 Numbers = Sequence[float] | Callable[[int], float] | float | None
-"""Numbers of frames: one of each, what gives them by the frame's number, one of all, the camera's."""
+"""Numbers of frames: one of each, what gives them by the frame's number, one of all; None: the
+camera's."""
 VALUES = 12
 """Numbers of a frame's pixels that are held at once while its noise is drawn."""
 
@@ -177,7 +178,7 @@ def frames(
         raise TypeError(f'{brief(camera)} is no camera; write frames(load("camera.yaml"), ...)')
     for value, name in ((batch, "batch"), (frames_each, "frames_each")):
         require_whole(value, name, 1)
-    found = backend.device(device) if isinstance(device, str) else device
+    found = open_device(device) if isinstance(device, str) else device
     asked = _Asked(times, gains, seeds, frames_each)
     with found.errors():
         try:
@@ -298,8 +299,9 @@ def ready(
     height, width, channels = shape
     seen = seen_by(solved, (height, width, channels), threads)
     light = pictures_light(seen, (height, width, channels), threads, device)
-    kept = isinstance(light, DeviceLight)
-    dtype = light.batched.transfer.dtype.type if kept else solved.settings.dtype
+    dtype = solved.settings.dtype
+    if isinstance(light, DeviceLight):
+        dtype = light.batched.transfer.dtype.type
     return BatchCamera(solved, device, dtype), light, float(seen.white_rate.max())
 
 
@@ -327,7 +329,7 @@ def _require(
     g = taker.solved.geometry
     values = count * g.rows * g.columns * VALUES * np.dtype(taker.dtype).itemsize
     needed = values + pictures * light.bytes_per_picture(shape[-1])
-    backend.require(device, needed, f"{count} frames of {g.rows} x {g.columns} pixels")
+    require(device, needed, f"{count} frames of {g.rows} x {g.columns} pixels")
 
 
 def _taken(
@@ -445,10 +447,9 @@ def _stacks(
             else:
                 yield _stacked([window(p, start + n) for n, p in enumerate(some)], device)
         return
-    number, held = 0, []
-    for picture in _read_ahead(pictures, camera, count):
+    held: list[Any] = []
+    for number, picture in enumerate(_read_ahead(pictures, camera, count)):
         held.append(window(picture, number))
-        number += 1
         if len(held) == count:
             yield _stacked(held, device)
             held = []
@@ -469,8 +470,9 @@ def _read_ahead(pictures: Iterable[Any], camera: Camera, count: int) -> Iterator
     from vcam_cli.files.images.images import read_picture
 
     source = camera.scene.source
-    given = isinstance(source, ImageFile)
-    encoding, white = (source.encoding, source.white) if given else ("auto", 1.0)
+    encoding, white = "auto", 1.0
+    if isinstance(source, ImageFile):
+        encoding, white = source.encoding, source.white
 
     def read(picture: Any) -> Any:
         if isinstance(picture, str | Path):

@@ -6,16 +6,18 @@ computes the light of each picture, as for a single frame, and it is copied.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.backend import Processor
+from vcam_cli.devices.processor import Processor
 from vcam_cli.effects.base import of_kind
-from vcam_cli.effects.pixel_signal import NeighborSharing, TemporalGain, Transport, VeilingGlare
+from vcam_cli.effects.pixel_signal import NeighborSharing, TemporalGain, Transport
 from vcam_cli.image_formation.batched_filter import BatchedFilter
-from vcam_cli.image_formation.photon_rate import gain_maps, spread_over_mosaic
+from vcam_cli.image_formation.photon_rate import on_mosaics
 from vcam_cli.image_formation.strategies import picture_filter
 from vcam_cli.progress import Stages
 from vcam_cli.readout.layout import Layout
@@ -32,9 +34,8 @@ class DeviceLight:
 
     device: Processor
     batched: BatchedFilter
-    acting: tuple[Array | VeilingGlare, ...]
-    """Gains (rows, columns) on the device, and glares, in their order."""
-    layout: Layout
+    acting: tuple[Callable[[Array], object], ...]
+    """Gains and glares, in their order; they change the light in place."""
     cut: tuple[slice, slice]
     """Rows and columns of a picture that are the scene."""
     black: tuple[int, int]
@@ -58,10 +59,7 @@ class DeviceLight:
         seen = pictures[:, *self.cut].astype(kind, copy=False)
         light = self.batched.apply(seen, self.black)
         for effect in self.acting:
-            if isinstance(effect, VeilingGlare):
-                spread_over_mosaic(light, self.layout.mosaic, effect)
-            else:
-                light *= effect
+            effect(light)
         return light
 
     def bytes_per_picture(self, channels: int) -> int:
@@ -136,17 +134,12 @@ def pictures_light(
     assert isinstance(scene, ImageScene)
     mosaic = layout.mosaic
     color = layout.color if len(mosaic.colors) > 1 else np.zeros(_size(layout), np.int32)
-    acting = tuple(
-        each if isinstance(each, VeilingGlare) else device.put(each)
-        for each in gain_maps(seen.path, dtype)
-    )
     height, width = scene.picture.shape[:2]
     top, left = (shape[0] - height) // 2, (shape[1] - width) // 2
     return DeviceLight(
         device=device,
         batched=BatchedFilter.of(image_filter, color, dtype, device),
-        acting=acting,
-        layout=layout,
+        acting=on_mosaics(seen.path, dtype, device.put),
         cut=(slice(top, top + height), slice(left, left + width)),
         black=scene.black,
     )

@@ -30,13 +30,13 @@ import numpy as np
 
 from vcam_cli.accuracy_study.ablation import with_effects, with_exposure_time
 from vcam_cli.arrays import Array
-from vcam_cli.backend import Processor
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry, pixel_centers
 from vcam_cli.camera.derived.mosaic import BLOCKS, NONE, mosaic
 from vcam_cli.camera.optics import Wavefront
 from vcam_cli.camera.scene.charts import SlantedEdge, Uniform
 from vcam_cli.camera.scene.illuminant import IlluminantSpec
+from vcam_cli.devices.processor import Processor
 from vcam_cli.effects.signal_chain import noise_sources
 from vcam_cli.errors import bad
 from vcam_cli.progress import Stages

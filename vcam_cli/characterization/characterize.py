@@ -11,8 +11,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from vcam_cli import backend
-from vcam_cli.backend import Processor
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.readouts import LARGE_PHOTODIODE, has_several, readouts
 from vcam_cli.camera.expectations import Limit
@@ -21,6 +19,8 @@ from vcam_cli.characterization.datasheet import COLUMNS, Quantity, notes, quanti
 from vcam_cli.characterization.exposures import Channel, measure_channels
 from vcam_cli.characterization.kept_frames import Keeper
 from vcam_cli.characterization.merged_snr import MergedSnr, measure_merged_snr
+from vcam_cli.devices.choice import open_device
+from vcam_cli.devices.processor import Processor
 from vcam_cli.errors import BadInput, CannotDo
 from vcam_cli.floats import own_float_errors
 from vcam_cli.parallel import available_workers
@@ -126,7 +126,7 @@ def characterize(
     """
     try:
         stages, workers = Stages(watch=watch or Silent()), workers or available_workers()
-        found = backend.device(device)
+        found = open_device(device)
         if has_several(camera):
             if found.name != "cpu":
                 message = "several readouts of a pixel: not measured on a graphics processor"

@@ -243,11 +243,11 @@ Workers = Annotated[
 def _device(name: str) -> str:
     """Refuse another name than those of devices, and a device that is not there."""
     if name != "cpu":
-        from vcam_cli import backend
+        from vcam_cli.devices.choice import DEVICES, open_device
 
-        if name not in backend.DEVICES:
+        if name not in DEVICES:
             raise typer.BadParameter(f"{name!r} is no device; write cpu or gpu")
-        backend.device(name)
+        open_device(name)
     return name
 
 

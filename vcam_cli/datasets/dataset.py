@@ -14,13 +14,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from vcam_cli import backend
 from vcam_cli.datasets import manifest
 from vcam_cli.datasets.dataset_file import DatasetFile
 from vcam_cli.datasets.device_frames import batches_of, compute_batches
 from vcam_cli.datasets.drawing import Frame
 from vcam_cli.datasets.frame_work import NPZ, FrameJob
 from vcam_cli.datasets.shards import Packer, Shard, scale, shards
+from vcam_cli.devices.choice import open_device
 from vcam_cli.errors import bad
 from vcam_cli.files.points_store import SweepFolder
 from vcam_cli.files.records import Fingerprint
@@ -218,7 +218,7 @@ def _compute_on_device(
     tell: Callable[[str], None],
 ) -> int:
     """Compute frames in batches on a device, and those that batches do not compute one by one."""
-    device = backend.device(execution.device)
+    device = open_device(execution.device)
     cameras, others = batches_of(groups)
     total, computed = sum(len(jobs) for jobs in cameras), 0
     for jobs in cameras:
@@ -263,5 +263,5 @@ def _record(file: DatasetFile, versions: dict[str, str], device: str) -> dict[st
             kind: 1 if model.format == "npz" else scale(kind, _scale(file)) for kind in model.write
         },
         "versions": versions,
-        "device": backend.device(device).describe() if device != "cpu" else device,
+        "device": open_device(device).describe() if device != "cpu" else device,
     }

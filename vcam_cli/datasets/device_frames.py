@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.backend import Processor
 from vcam_cli.batches.batch_camera import BatchCamera
 from vcam_cli.batches.frames import linear_pictures, metered, ready, solved_for
 from vcam_cli.batches.light import DeviceLight, ProcessorLight
 from vcam_cli.datasets.frame_work import NPZ, FrameJob, noise_labels
+from vcam_cli.devices.processor import Processor
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.pixel_signal import TemporalGain, Transport
 from vcam_cli.effects.warps import Warp

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.backend import Processor
+from vcam_cli.devices.processor import Processor
 from vcam_cli.image_formation.cosine_series import Axis, segments
 from vcam_cli.image_formation.filtering import Filter
 

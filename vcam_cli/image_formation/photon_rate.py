@@ -8,7 +8,7 @@ result.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
@@ -257,8 +257,10 @@ def spread_over_mosaic(light: Array, mosaic: Mosaic, glare: VeilingGlare) -> Non
         light[..., row::period, columns] += even[..., None, None]
 
 
-def gain_maps(path: OpticalPath, dtype: type) -> list[Array | VeilingGlare]:
-    """Return what acts on the light at the photodetectors, in its order.
+def on_mosaics(
+    path: OpticalPath, dtype: type, put: Callable[[Array], Array]
+) -> tuple[Callable[[Array], object], ...]:
+    """Return what acts on the light at the photodetectors of a mosaic, in its order.
 
     Parameters
     ----------
@@ -266,19 +268,28 @@ def gain_maps(path: OpticalPath, dtype: type) -> list[Array | VeilingGlare]:
         Lens, pixels and settings.
     dtype : type
         Floating-point type.
+    put : callable
+        Brings a map to the device of the light.
 
     Returns
     -------
-    list
-        Products of gains (rows, columns), relative to the axis, and glares between them.
+    tuple of callable
+        Functions that change light (..., rows, columns) in place: products of gains, relative to
+        the axis, and glares between them.
     """
-    x, y = (axis.astype(dtype) for axis in pixel_centers(path.geometry))
+    centers: list[Array] = [axis.astype(dtype) for axis in pixel_centers(path.geometry)]
     glares, gains = _glares_and_gains(path.effects)
-    found: list[Array | VeilingGlare] = []
+    found: list[Callable[[Array], object]] = []
     for number, group in enumerate(gains):
         if number:
-            found.append(glares[number - 1])
+            glare = glares[number - 1]
+            found.append(partial(spread_over_mosaic, mosaic=path.mosaic, glare=glare))
         if group:
-            maps = (e.gain(x, y) / (e.on_axis or 1.0) for e in group)
-            found.append(np.prod(np.broadcast_arrays(*maps), axis=0).astype(dtype))
-    return found
+            maps = (e.gain(*centers) / (e.on_axis or 1.0) for e in group)
+            product = np.prod(np.broadcast_arrays(*maps), axis=0).astype(dtype)
+            found.append(partial(_scale, factor=put(product)))
+    return tuple(found)
+
+
+def _scale(light: Array, factor: Array) -> None:
+    np.multiply(light, factor, out=light)

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from vcam_cli import counter_noise
 from vcam_cli.arrays import Array
-from vcam_cli.backend import Processor
+from vcam_cli.devices import counter_noise
+from vcam_cli.devices.processor import Processor
 from vcam_cli.effects.signal_chain import Site
 from vcam_cli.readout.exposure import LAYER
 from vcam_cli.rng import BLOCK_ROWS, blocks, stream

@@ -1,4 +1,4 @@
-"""From the rate of electrons to a raw frame on a device: `exposure.capture` with its random numbers.
+"""From the rate of electrons to a raw frame on a device: `exposure.capture` with its numbers.
 
 The light comes from the processor, and what is read goes back there. What sense nodes show of
 blooming and of interpixel capacitance is computed by the processor on the way.
@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.backend import Processor
+from vcam_cli.devices.processor import Processor
 from vcam_cli.effects.base import Effect
 from vcam_cli.effects.signal_chain import Quantizer, electron_effects
 from vcam_cli.errors import CannotDo
@@ -67,8 +67,8 @@ def capture(
         ]
         return np.array([e for e, _ in found]), np.array([dn for _, dn in found])
     with device.errors():
-        dtype, shape = rate.dtype.type, (rate.shape[0], rate.shape[1])
-        maps = _maps(device, seeds["sensor"], shape, dtype, coarse_normals, layer)
+        shape = rate.shape[0], rate.shape[1]
+        maps = _maps(device, seeds["sensor"], shape, rate.dtype.str, coarse_normals, layer)
         here = sites(maps, [seeds["frame"]], exposure.mean_dark(time, effects), layer)
         in_front = electron_effects(effects, behind_well=False)
         tile = exposure.mean_charge(device.put(rate)[None], time, effects, here)
@@ -99,9 +99,9 @@ def _maps(
     device: Processor,
     seed: int,
     shape: tuple[int, int],
-    dtype: type,
+    dtype: str,
     coarse_normals: bool,
     layer: int,
 ) -> SensorMaps:
     """Return what stays with a sensor; frames of one sensor have it in common."""
-    return SensorMaps(device, seed, *shape, dtype, coarse_normals, layer)
+    return SensorMaps(device, seed, *shape, np.dtype(dtype).type, coarse_normals, layer)

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.backend import Processor
 from vcam_cli.camera.derived.electrical import Electrical
 from vcam_cli.camera.scene.sources import Layers
+from vcam_cli.devices.processor import Processor
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.pixel_signal import Gain
 from vcam_cli.errors import CannotDo

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from vcam_cli.backend import Processor
+from vcam_cli.devices.processor import Processor
 from vcam_cli.image_formation.rate_cache import RateCache
 from vcam_cli.progress import Stages
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from vcam_cli import backend
 from vcam_cli.arguments import brief, require_folder, require_whole
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
+from vcam_cli.devices.choice import open_device
 from vcam_cli.errors import BadInput
 from vcam_cli.floats import own_float_errors
 from vcam_cli.parallel import suitable_workers
@@ -126,7 +126,7 @@ def simulate(
     stages = Stages(watch=observer(watch))
     try:
         shared = shared or RECENT.shared_with(camera)
-        run = Run(workers or threads(camera), stages, shared.rate_cache, backend.device(device))
+        run = Run(workers or threads(camera), stages, shared.rate_cache, open_device(device))
         return _simulate(camera, run, shared, before)
     except BadInput as error:
         raise error.with_places(camera.locate) from None

@@ -264,8 +264,8 @@ class SweepResult:
 def request_hash(study: StudyFile, sets: Sequence[str], extras: Extras, device: str = "cpu") -> str:
     """Return the hash of what is asked, but for the contents of the files that it names.
 
-    sets: overrides "PATH=VALUE" laid over every camera; device: where noise is drawn. Raises BadInput
-    for another text.
+    sets: overrides "PATH=VALUE" laid over every camera; device: where noise is drawn. Raises
+    BadInput for another text.
     """
     folder = current_folder()
     over = cameras.overlay(sets, folder)

@@ -70,7 +70,7 @@ class PatternShading(NoiseSource):
 
     def _maps(self, site: Site) -> Array:
         """Return offsets and gains of a block (2, rows, columns); 0 where there are none."""
-        maps = np.zeros((2, site.rows, site.columns), site.dtype)
+        maps: Array = np.zeros((2, site.rows, site.columns), site.dtype)
         strengths = zip((self.offset, self.gain), self._strengths(site), maps, strict=True)
         for rms, waves, target in strengths:
             if rms:

@@ -1,4 +1,4 @@
-"""Where batches of frames are computed: the processor, or a graphics processor.
+"""The processor as a device: NumPy's arrays, and what they do not share with other libraries.
 
 Code of the hot path takes arrays of either kind: NumPy hands its functions to the library of the
 array (NEP 13 and NEP 18), so that an effect is written once. What that does not cover is a
@@ -16,11 +16,11 @@ import numpy as np
 import scipy.fft
 from numpy.typing import DTypeLike
 
-from vcam_cli import counter_noise, memory
+from vcam_cli import memory
 from vcam_cli.arrays import Array
+from vcam_cli.devices import counter_noise
 from vcam_cli.errors import CannotDo
 
-DEVICES = ("cpu", "gpu")
 SHARE = 0.8
 """Part of the free memory of a device that batches may take."""
 
@@ -34,7 +34,7 @@ class Processor:
         """Return the device and its library, for `run.json`."""
         return f"cpu, NumPy {np.__version__}"
 
-    def put(self, values: Any, dtype: DTypeLike = None) -> Array:
+    def put(self, values: Any, dtype: DTypeLike | None = None) -> Array:
         """Return values of the processor as an array of the device.
 
         Parameters
@@ -98,7 +98,7 @@ class Processor:
         return counter_noise.poisson(mean, word.reshape(mean.shape))
 
     def add_normals(self, values: Array, rms: float, keys: Array, name: str, sample: int) -> Array:
-        """Return values (B, ...) plus normal numbers of a standard deviation; it reuses the array."""
+        """Return values (B, ...) plus normal numbers of a standard deviation, in their array."""
         z = self.normals(keys, name, sample, values[0].size, values.dtype)
         z *= rms
         values += z.reshape(values.shape)
@@ -110,7 +110,7 @@ class Processor:
         most: float,
         line: tuple[float, float],
         highest: int,
-        dtype: DTypeLike = None,
+        dtype: DTypeLike | None = None,
     ) -> Array:
         """Return min(values, most) on a line, clipped to 0 and a highest level.
 
@@ -130,10 +130,10 @@ class Processor:
         kind = values.dtype.type
         level = np.minimum(values, kind(most)) * kind(line[0])
         level += kind(line[1])
-        if dtype is None:
-            return np.clip(level, 0, highest, out=level)
-        np.rint(level, out=level)
-        return np.clip(level, 0, highest, out=level).astype(dtype)
+        if dtype is not None:
+            np.rint(level, out=level)
+        found: Array = np.clip(level, 0, highest, out=level)
+        return found if dtype is None else found.astype(dtype)
 
     def stacked(self, pictures: Sequence[Any]) -> Array:
         """Return pictures of one shape as one array (n, ...) of the device."""
@@ -222,30 +222,6 @@ class Processor:
             return whole
         found: Array = np.take_along_axis(whole, color[None, None], axis=1)[:, 0]
         return np.maximum(found, 0, out=found)
-
-
-def device(name: str) -> Processor:
-    """Return the device of a name.
-
-    Parameters
-    ----------
-    name : str
-        "cpu" or "gpu".
-
-    Raises
-    ------
-    ValueError
-        For another name.
-    CannotDo
-        Where there is no such device, or no library for it.
-    """
-    if name == "cpu":
-        return Processor()
-    if name != "gpu":
-        raise ValueError(f"device {name!r}; write one of {', '.join(DEVICES)}")
-    from vcam_cli.cuda import open_device
-
-    return open_device()
 
 
 def require(device: Processor, needed: int, what: str) -> None:

@@ -11,9 +11,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import DTypeLike
 
-from vcam_cli import counter_noise
 from vcam_cli.arrays import Array
-from vcam_cli.backend import SHARE, Processor
+from vcam_cli.devices import counter_noise
+from vcam_cli.devices.processor import SHARE, Processor
 from vcam_cli.errors import CannotDo
 
 THREADS, MOST_BLOCKS = 256, 1 << 16
@@ -40,7 +40,7 @@ class Cuda(Processor):
         found = cupy.cuda.runtime.getDeviceProperties(cupy.cuda.Device().id)["name"]
         return f"gpu, {found.decode()}, CuPy {cupy.__version__}"
 
-    def put(self, values: Any, dtype: DTypeLike = None) -> Array:
+    def put(self, values: Any, dtype: DTypeLike | None = None) -> Array:
         """Return values as a contiguous array of the device."""
         if isinstance(values, np.ndarray) and values.nbytes >= PINNED:
             staged = self._pinned(values.shape, values.dtype if dtype is None else dtype)
@@ -62,7 +62,7 @@ class Cuda(Processor):
 
     def _pinned(self, shape: tuple[int, ...], dtype: DTypeLike) -> Array:
         """Return an array of the processor in memory from which copies are ten times as fast."""
-        import cupyx
+        import cupyx  # type: ignore[import-not-found]
 
         array: Array = cupyx.empty_pinned(shape, dtype)
         return array
@@ -128,7 +128,7 @@ class Cuda(Processor):
         most: float,
         line: tuple[float, float],
         highest: int,
-        dtype: DTypeLike = None,
+        dtype: DTypeLike | None = None,
     ) -> Array:
         """Return min(values, most) on a line, clipped to 0 and a highest level."""
         values = self._cupy.ascontiguousarray(values)
@@ -168,7 +168,7 @@ class Cuda(Processor):
             *(*map(np.int64, sizes), np.int32(1)),
         )
         half = cupy.fft.rfft2(planes)
-        out = planes  # of the same size
+        out: Array = planes  # of the same size
         turns = (self._turns(length, planes.dtype) for length in shape)
         self._launch(
             *("cosines", out.dtype, out.size, half, *turns, out),
@@ -229,14 +229,14 @@ class Cuda(Processor):
 @lru_cache(maxsize=2)
 def _kernels(width: int) -> Any:
     """Return the kernels for floating-point numbers of 4 or of 8 bytes."""
-    import cupy
+    import cupy  # type: ignore[import-not-found]
 
     kind = f"-DREAL={'float' if width == 4 else 'double'}"
     return cupy.RawModule(code=SOURCE.read_text(), options=(*OPTIONS, kind))
 
 
 @lru_cache(maxsize=1)
-def open_device() -> Cuda:
+def open_cuda() -> Cuda:
     """Return the graphics processor.
 
     Raises
@@ -259,7 +259,7 @@ def open_device() -> Cuda:
 
 @contextmanager
 def _device_errors() -> Iterator[None]:
-    """Raise what a graphics processor cannot do as CannotDo: no memory, or a device that is lost."""
+    """Raise failures of a graphics processor as CannotDo: no memory, or a device that is lost."""
     try:
         yield
     except Exception as error:

@@ -126,9 +126,27 @@ def words(keys: Array, name: str, sample: int, count: int) -> Array:
         np.full(shape, low, np.uint32),
         np.full(shape, high, np.uint32),
     ]
-    half = np.uint64(32)
-    first = np.broadcast_to(keys.astype(np.uint32)[:, None], shape)
-    second = np.broadcast_to((keys >> half).astype(np.uint32)[:, None], shape)
+    halves = keys.astype(np.uint32)[:, None], (keys >> np.uint64(32)).astype(np.uint32)[:, None]
+    found = philox(counter, [np.broadcast_to(half, shape) for half in halves])
+    return np.stack(found, axis=-1).reshape(len(keys), -1)[:, :count]
+
+
+def philox(counter: list[Array], key: list[Array]) -> list[Array]:
+    """Return the output of Philox 4x32 with ten rounds.
+
+    Parameters
+    ----------
+    counter : list of Array
+        Four words of the counters, uint32.
+    key : list of Array
+        Two words of the keys, in their shape.
+
+    Returns
+    -------
+    list of Array
+        Four words in the same shape.
+    """
+    half, (first, second) = np.uint64(32), key
     with np.errstate(over="ignore"):
         for _ in range(ROUNDS):
             a = _M0 * counter[0].astype(np.uint64)
@@ -140,7 +158,7 @@ def words(keys: Array, name: str, sample: int, count: int) -> Array:
                 a.astype(np.uint32),
             ]
             first, second = first + _W0, second + _W1
-    return np.stack(counter, axis=-1).reshape(len(keys), -1)[:, :count]
+    return counter
 
 
 def normals(word: Array) -> Array:
@@ -212,7 +230,7 @@ def poisson(mean: Array, word: Array) -> Array:
     z = normals(word).astype(kind)
     root = np.sqrt(np.maximum(mean, kind(EXPANDED_MEAN)))
     square = z * z
-    out = (square * kind(-1 / 72) - kind(1 / 36)) * z / root + square * kind(1 / 6)
+    out: Array = (square * kind(-1 / 72) - kind(1 / 36)) * z / root + square * kind(1 / 6)
     out = np.maximum(np.floor(out + root * z + mean + kind(1 / 3)), kind(0))
     low = mean < EXPANDED_MEAN
     if low.any():

@@ -1,0 +1,1 @@
+"""Where batches of frames are computed: the processor, or a graphics processor."""
