@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 SOURCES := vcam_cli tests scripts
 CAMERA ?= still-life
 
-.PHONY: run test test-all lint check bench interchange promise stability docs figures fuzz attacks schemas tables thesis lock clean
+.PHONY: run test test-all lint check bench check-gpu bench-gpu interchange promise stability docs figures fuzz attacks schemas tables thesis lock clean
 
 run: $(VENV)/.runtime  ## simulate the shipped still life: out/still-life/
 	$(BIN)/vcam run $(CAMERA)
@@ -27,6 +27,12 @@ check: lint test-all  ## format, lint, spelling, types, all tests
 
 bench: $(VENV)/.dev  ## speed, as ratios: to bare transforms and draws, to plain NumPy, by camera, stage and effect
 	$(BIN)/python -m tests.bench
+
+check-gpu: $(VENV)/.dev  ## a graphics processor: its numbers, transforms, frames and noise, and its speed
+	$(BIN)/python -m tests.gpu
+
+bench-gpu: $(VENV)/.dev  ## its speed, as ratios to bare transforms, draws and copies
+	$(BIN)/python -m tests.gpu bench
 
 interchange: $(VENV)/.dev  ## raw.dng in other people's readers: bits, colors and seconds, as a table
 	$(BIN)/python -m tests.interchange

@@ -12,6 +12,8 @@
 
 `result.save("out/mine")` writes what `vcam run` writes.
 
+`frames(camera, pictures, device="gpu")` yields batches of labeled frames for learning.
+
 `sweep`, `schedule` and `dataset` run studies and write into a folder; their tables are rows.
 `plan`, `accuracy`, `characterize`, `fit`, `verify` and `compare` return what the commands of these
 names find, and write what those write where `out` names a folder. `BadInput` and `CannotDo` are
@@ -30,6 +32,7 @@ __version__ = "1.0.0"
 _HOMES = {
     "BadInput": "vcam_cli.errors",
     "CannotDo": "vcam_cli.errors",
+    "frames": "vcam_cli.batches.frames",
     "load": "vcam_cli.camera.load",
     "schedule": "vcam_cli.capture_schedules.study",
     "simulate": "vcam_cli.simulation.simulate",
@@ -49,6 +52,7 @@ __all__ = [
     "compare",
     "dataset",
     "fit",
+    "frames",
     "load",
     "plan",
     "schedule",
@@ -58,6 +62,7 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
+    from vcam_cli.batches.frames import frames
     from vcam_cli.camera.load import load
     from vcam_cli.capture_schedules.study import schedule
     from vcam_cli.errors import BadInput, CannotDo

@@ -87,6 +87,9 @@ class FakeArray(NDArrayOperatorsMixin):
 class FakeDevice(Processor):
     name = "fake"
 
+    def describe(self):
+        return self.name
+
     def put(self, values, dtype=None):
         values = values.values if isinstance(values, FakeArray) else values
         return FakeArray(super().put(values, dtype))

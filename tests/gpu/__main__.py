@@ -2,11 +2,14 @@
 
     python -m tests.gpu              checks, statistics, bench
     python -m tests.gpu check        checks and statistics
+    python -m tests.gpu commands     every command with --device gpu
     python -m tests.gpu bench        bench
 
 Each check stands alone: one that fails hides no other. The exit status is 1 where one failed.
 """
 
+import json
+import subprocess
 import sys
 import tempfile
 import time
@@ -23,6 +26,19 @@ from vcam_cli.devices import counter_noise
 from vcam_cli.devices.choice import open_device
 from vcam_cli.devices.processor import Processor, require
 
+DATASET = """
+kind: dataset
+name: pairs
+camera: starter
+scenes: {files: "*.png", frames_each: 4}
+vary:
+  exposure.time: {log_uniform: [1 ms, 30 ms]}
+  exposure.gain: {choice: [1, 2, 4, 8]}
+frames: 512
+size: {rows: 512, columns: 512}
+write: [raw, clean]
+shards: 4
+"""
 MEAN = 1e-5
 """Difference from the processor's mean signal that is allowed, over full signal."""
 failed: list[str] = []
@@ -81,6 +97,12 @@ def words(device: Processor) -> str:
         share = np.mean(drawn == expected)
         assert share > 0.9999, share
         said.append(f"Poisson equal {share:.6f}")
+    values = np.linspace(-50, 900, 5 * count, dtype=np.float32).reshape(5, count)
+    noisy = device.get(device.add_normals(device.put(values), 2.5, keys, "read_noise", 0))
+    assert np.abs(noisy - host.add_normals(values.copy(), 2.5, own, "read_noise", 0)).max() < 2e-4
+    for dtype in (None, np.uint16, np.uint32):
+        found = device.get(device.on_line(device.put(values), 800.0, (0.37, 12.0), 255, dtype))
+        assert (found == host.on_line(values, 800.0, (0.37, 12.0), 255, dtype)).all()
     u = device.get(device.uniforms(keys, "even", 0, count))
     assert (u == host.uniforms(own, "even", 0, count)).all()
     assert counter_noise.words(host.keys([0]), "x", 0, 4).tolist() == [
@@ -118,42 +140,41 @@ def transforms(device: Processor) -> str:
     return f"at most {most:.2g} of the largest, 32 bits"
 
 
-def cameras(device: Processor) -> list[Callable[[], str]]:
-    """Frames of shipped cameras on the device and on the processor, word by word."""
-    names = (
-        *("starter", "imx477", "12mp-bayer", "low-light", "nikon-d850", "street", "everything"),
-        *("csf-monochrome", "canon-5d4", "pixel-4a", "sony-a7s2", "imx900"),
-    )
+NAMES = (
+    *("starter", "imx477", "12mp-bayer", "low-light", "nikon-d850", "street", "everything"),
+    *("csf-monochrome", "canon-5d4", "pixel-4a", "sony-a7s2", "imx900"),
+)
+"""Cameras whose frames are compared."""
 
-    def one(name: str) -> str:
-        pictures = np.stack([photograph(96, 128, seed) for seed in range(3)])
-        model = camera(name, 96, 128, "exposure.time=10 ms")
-        asked = {"batch": 4, "frames_each": 2}
-        here = list(frames(model, pictures, device=device, **asked))
-        host = list(frames(model, pictures, **asked))
-        again = list(frames(model, pictures, device=device, batch=6, frames_each=2))
-        dn = np.concatenate([device.get(b.dn) for b in here])
-        clean = np.concatenate([device.get(b.clean) for b in here])
-        other = np.concatenate([device.get(b.dn) for b in again])
-        assert (dn == other).all(), "another batch size gives other bytes"
-        expected = np.concatenate([b.dn for b in host])
-        truth = np.concatenate([b.clean for b in host])
-        full = float(truth.max() - truth.min())
-        error = float(np.abs(clean - truth).max()) / full
-        assert error < MEAN, error
-        share = float(np.mean(dn == expected))
-        apart = int(np.abs(dn.astype(int) - expected.astype(int)).max())
-        assert share > 0.9, (share, apart)
-        _, light, _ = ready(solved_for(model), pictures.shape[1:], device)
-        said = ""
-        if len(here[0].pattern) == 2 and len(here[0].pattern[0]) == 2:
-            rgb, ref = here[0].demosaic(here[0].dn), host[0].demosaic(host[0].dn)
-            error_rgb = float(np.abs(device.get(rgb) - ref).max())
-            said = f", demosaic {error_rgb:.3g} DN"
-        equal = f"codes equal {share:.5f}, {apart} apart"
-        return f"light on {light.where}, clean {error:.2g}, {equal}{said}"
 
-    return [(name, lambda name=name: one(name)) for name in names]
+def frames_of(device: Processor, name: str) -> str:
+    """Frames of a shipped camera on the device and on the processor, code by code."""
+    pictures = np.stack([photograph(96, 128, seed) for seed in range(3)])
+    model = camera(name, 96, 128, "exposure.time=10 ms")
+    asked = {"batch": 4, "frames_each": 2}
+    here = list(frames(model, pictures, device=device, **asked))
+    host = list(frames(model, pictures, **asked))
+    again = list(frames(model, pictures, device=device, batch=6, frames_each=2))
+    dn = np.concatenate([device.get(b.dn) for b in here])
+    clean = np.concatenate([device.get(b.clean) for b in here])
+    other = np.concatenate([device.get(b.dn) for b in again])
+    assert (dn == other).all(), "another batch size gives other bytes"
+    expected = np.concatenate([b.dn for b in host])
+    truth = np.concatenate([b.clean for b in host])
+    full = float(truth.max() - truth.min())
+    error = float(np.abs(clean - truth).max()) / full
+    assert error < MEAN, error
+    share = float(np.mean(dn == expected))
+    apart = int(np.abs(dn.astype(int) - expected.astype(int)).max())
+    assert share > 0.9, (share, apart)
+    _, light, _ = ready(solved_for(model), pictures.shape[1:], device)
+    said = ""
+    if len(here[0].pattern) == 2 and len(here[0].pattern[0]) == 2:
+        rgb, ref = here[0].demosaic(here[0].dn), host[0].demosaic(host[0].dn)
+        error_rgb = float(np.abs(device.get(rgb) - ref).max())
+        said = f", demosaic {error_rgb:.3g} DN"
+    equal = f"codes equal {share:.5f}, {apart} apart"
+    return f"light on {light.where}, clean {error:.2g}, {equal}{said}"
 
 
 def per_frame(device: Processor) -> str:
@@ -241,6 +262,38 @@ def too_large(device: Processor) -> str:
     except CannotDo as error:
         return str(error)
     raise AssertionError("not refused")
+
+
+def commands() -> None:
+    """Every command with --device gpu."""
+    from vcam_cli.files.images.png import write_png
+
+    small = ("--set", "array.rows=120", "--set", "array.columns=160", "-q")
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder)
+        write_png(place / "p.png", photograph(1000, 1400))
+        text = DATASET.replace("512", "64").replace("shards: 4", "shards: 2")
+        (place / "set.yaml").write_text(text)
+        for words in (
+            ("run", "starter", *small),
+            ("run", "starter", *small, "--frames", "3", "--fps", "10"),
+            ("sweep", "exposure-and-noise", "-q", "--workers", "1"),
+            ("characterize", "starter", "-q"),
+            ("dataset", str(place / "set.yaml"), "-q"),
+        ):
+            out = place / f"{words[0]}{len(words)}"
+            asked = [sys.executable, "-m", "vcam_cli.commands.main", *words]
+            asked += ["--device", "gpu", "-o", str(out)]
+
+            def run(asked=asked, out=out) -> str:
+                found = subprocess.run(asked, capture_output=True, text=True)
+                assert found.returncode == 0, found.stderr[-1500:]
+                records = sorted(out.glob("*.json"))
+                return f"{len(list(out.rglob('*')))} files; " + ", ".join(
+                    f"{path.name}: {json.loads(path.read_text()).get('device')}" for path in records
+                )
+
+            check(f"vcam {words[0]} --device gpu", run)
 
 
 # --- speed ---------------------------------------------------------------------------------------
@@ -382,21 +435,58 @@ def bench(device: Processor) -> None:
             "aim 200",
         )
 
+    def written() -> None:
+        from vcam_cli import dataset
+        from vcam_cli.files.images.png import write_png
+
+        with tempfile.TemporaryDirectory() as folder:
+            place = Path(folder)
+            for number in range(8):
+                write_png(place / f"p{number}.png", photograph(1000, 1400, number))
+            (place / "set.yaml").write_text(DATASET)
+            start = time.perf_counter()
+            with (place / "raw").open("wb", buffering=0) as file:
+                block = np.random.default_rng(0).bytes(1 << 26)
+                for _ in range(8):
+                    file.write(block)
+            speed = 8 * len(block) / (time.perf_counter() - start)
+            row("disk, one file", speed / 1e6, "MB/s")
+            start = time.perf_counter()
+            found = dataset(place / "set.yaml", place / "out", device="gpu")
+            spent = time.perf_counter() - start
+            assert found.failed == 0
+            row("512² data set, written shards: pairs a second", found.frames / spent, "1/s")
+
+    def host_time() -> None:
+        """Seconds of Python for a batch: pixels are few."""
+        model = camera("starter", 16, 16, "exposure.time=10 ms")
+        pictures = cupy.random.random((64 * 32, 16, 16, 3), dtype=np.float32)
+        drawn = np.random.default_rng(0).uniform(0.001, 0.03, 4096)
+        plain = rate(frames(model, pictures, device=device))
+        row("a batch of 64 frames of 16²", 64e3 / plain, "ms")
+        asked = {"times": lambda n: drawn[n % 4096], "gains": lambda n: (1.0, 2.0, 4.0, 8.0)[n % 4]}
+        found = rate(frames(model, pictures, device=device, **asked))
+        row("   with times and 4 gains", 64e3 / found, "ms")
+        asked.pop("gains")
+        row("   with times", 64e3 / rate(frames(model, pictures, device=device, **asked)), "ms")
+
+    check("bench written", written)
+    check("bench of Python", host_time)
     for name, function in (("bench 512²", small), ("bench 12 MP", large), ("bench 1 MP", sequence)):
         check(name, function)
 
 
 def main() -> int:
     """Run what was asked for."""
-    asked = sys.argv[1:] or ["check", "bench"]
+    asked = sys.argv[1:] or ["check", "commands", "bench"]
     start = time.perf_counter()
     device = open_device("gpu")
     print(device.describe(), f"{device.free_memory() / 1e9:.1f} GB may be used", flush=True)
     if "check" in asked:
         check("words of the kernels", lambda: words(device))
         check("transforms", lambda: transforms(device))
-        for name, function in cameras(device):
-            check(f"frames of {name}", function)
+        for name in NAMES:
+            check(f"frames of {name}", lambda name=name: frames_of(device, name))
         check("times, gains, places", lambda: per_frame(device))
         check("means of single frames", lambda: means(device))
         check("exchange with torch", lambda: exchange(device))
@@ -410,6 +500,8 @@ def main() -> int:
 
         check("statistics of the generator", lambda: statistics(generator(device, 16, 256)))
         check("statistics of every source", lambda: statistics(sources(device, 64, 128)))
+    if "commands" in asked:
+        commands()
     if "bench" in asked:
         bench(device)
     print(f"{len(failed)} failed {failed}; {time.perf_counter() - start:.1f} s", flush=True)
