@@ -88,6 +88,7 @@ class Characterization:
             "name": self.bench.camera.name,
             "exposure_time": self.bench.time,
             "pedestal": self.bench.pedestal,
+            "device": "cpu" if self.bench.device is None else self.bench.device.describe(),
             "quantities": [dict(zip(COLUMNS, q.row, strict=True)) for q in self.quantities],
             "channels": {c.color: _measured_points(c) for c in self.channels},
             **({"merged_snr": [point.row for point in self.merged]} if self.merged else {}),

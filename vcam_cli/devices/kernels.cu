@@ -217,7 +217,7 @@ KERNEL cosines(const REAL* v, const REAL* turn_y, const REAL* turn_x, REAL* out,
   }
 }
 
-// Terms filtered and summed over the mixtures: out[c, y, x] = sum_m spectrum[m, iy, ix] t[m, c, y, x].
+// Terms filtered and summed over the mixtures: out[c, y, x] = sum_m spectrum[m, from y, from x] t[m, c, y, x].
 KERNEL filtered(const REAL* spectrum, const REAL* transfer, const int* from_y, const int* from_x,
                 REAL* out, i64 n, int mixtures, int colors, i64 terms_y, i64 terms_x, i64 rows,
                 i64 columns) {

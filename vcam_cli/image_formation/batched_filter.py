@@ -1,7 +1,7 @@
 """A filter as one factor a coefficient, for many pictures of a size on one device.
 
 `Filter.apply` computes transfer functions as it goes, which suits one picture. Where many follow,
-they are computed once: on terms that no coefficient and no pixel tells apart they are summed first.
+they are computed once: terms that neither samples nor pixels distinguish are summed first.
 With S samples and V pixels along an axis these are the terms up to the least common multiple of
 both; so a picture of as many samples as pixels has one factor a sample, mixture and color.
 """
@@ -19,15 +19,15 @@ from vcam_cli.image_formation.cosine_series import Axis, segments
 from vcam_cli.image_formation.filtering import Filter
 
 
-def _told_apart(axis: Axis) -> int:
-    """Return how many terms samples and pixels tell apart along an axis, where none is cut off."""
+def _distinguished(axis: Axis) -> int:
+    """Return the number of terms along an axis that samples and pixels distinguish."""
     assert axis.virtual_pixels is not None
     return math.lcm(axis.samples, axis.virtual_pixels)
 
 
 def _sources(axis: Axis) -> Array:
-    """Return the coefficient behind each of the terms that are told apart, int32."""
-    count = min(axis.terms, _told_apart(axis))
+    """Return the coefficient behind each distinguished term, int32."""
+    count = min(axis.terms, _distinguished(axis))
     index, _ = axis.coefficient_index(np.arange(count))
     return index.astype(np.int32)
 
@@ -42,15 +42,15 @@ def _fold_weights(axis: Axis) -> Array:
 
 
 def _transfer(image_filter: Filter, dtype: type) -> Array:
-    """Return the factors of all terms that are told apart, (R, C, along y, along x).
+    """Return the factors of all distinguished terms, (R, C, along y, along x).
 
     Terms of the same coefficient and the same wave at the pixels are summed; where one of both
     vanishes a term counts nothing.
     """
     x, y = image_filter.x, image_filter.y
-    counts = tuple(min(axis.terms, _told_apart(axis)) for axis in (y, x))
+    counts = tuple(min(axis.terms, _distinguished(axis)) for axis in (y, x))
     out: Array = np.zeros((*image_filter.tables.shape, *counts), dtype)
-    weights, period_x, period_y = _fold_weights(x), _told_apart(x), _told_apart(y)
+    weights, period_x, period_y = _fold_weights(x), _distinguished(x), _distinguished(y)
     for mixture, color, terms, factors in image_filter.factors():
         width = factors.shape[1]
         factors *= weights[:width]

@@ -227,7 +227,7 @@ def _spectral_layers(
 def picture_filter(path: OpticalPath, scene: AnyScene) -> tuple[Filter, type] | None:
     """Return the one filter that brings all pictures of a size to the pixels, and its float type.
 
-    It follows the spectrum as far as lens and pixels pass it, whatever the picture holds.
+    It follows the spectrum up to the cut-off of lens and pixels, for any picture.
 
     Parameters
     ----------

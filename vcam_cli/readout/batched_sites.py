@@ -24,7 +24,7 @@ from vcam_cli.rng import BLOCK_ROWS, blocks, stream
 
 @dataclass(frozen=True)
 class SensorMaps:
-    """What stays with a sensor, on a device: drawn and copied when it is first asked for."""
+    """What stays with a sensor, on a device: drawn and copied when it is first needed."""
 
     device: Processor
     seed: int
