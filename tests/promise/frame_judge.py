@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import traceback
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import frame_truth
@@ -17,6 +17,7 @@ from periodic_cameras import TOLERANCES
 
 from vcam_cli import simulate
 from vcam_cli.floats import rms
+from vcam_cli.image_formation.optical_path import SpectrumReport
 from vcam_cli.simulation.simulate import prepare
 
 
@@ -35,6 +36,8 @@ class Judged:
     """What is left of the truth's error, of full signal."""
     said: str = ""
     """What a failure says."""
+    predicted: dict[str, float] = field(default_factory=dict)
+    """Preset -> predicted error of the mean over T x full signal, where the scene has depth."""
 
     @property
     def misses(self) -> bool:
@@ -48,10 +51,14 @@ class Judged:
     @property
     def text(self) -> str:
         errors = "  ".join(
-            f"{preset} {self.mean[preset]:.3g} T, {self.variance[preset]:.3g} of 2 T"
+            f"{preset} {self.mean[preset]:.3g} T{self._said(preset)},"
+            f" {self.variance[preset]:.3g} of 2 T"
             for preset in self.mean
         )
         return f"{self.kind:<9} {self.name:<28} {errors}  {self.said}".rstrip()
+
+    def _said(self, preset: str) -> str:
+        return f" ({self.predicted[preset]:.3g} predicted)" if preset in self.predicted else ""
 
 
 def judge(
@@ -65,7 +72,7 @@ def judge(
     """Judge one frame; files are written into a folder. tolerances: accuracy -> T."""
     camera = frame.load(folder, "draft", "all")
     true = frame_truth.truth(frame, camera)
-    mean, variance, said = {}, {}, ""
+    mean, variance, predicted, said = {}, {}, {}, ""
     try:
         all_on = prepare(camera, 1)[0]
     except Exception:
@@ -76,11 +83,19 @@ def judge(
             result = simulate(frame.load(folder, accuracy, effects), workers=1)
             off = error(result.mean_electrons, true)
             mean[accuracy] = max(0.0, off - true.error) / tolerance
+            if (told := _predicted(result.frame.spectrum)) is not None:
+                predicted[accuracy] = told / tolerance
             lost = promises.variance_lost_of(result.frame, all_on, levels(true))
             variance[accuracy] = lost / (2 * tolerance)
         except Exception:
             said = said or _last_line()
-    return Judged(kind, name, mean, variance, true.error, said)
+    return Judged(kind, name, mean, variance, true.error, said, predicted)
+
+
+def _predicted(report: SpectrumReport) -> float | None:
+    """What a scene with depth is said to err by, of full signal."""
+    depth = report.depth or report.cut
+    return depth.error if depth else None
 
 
 def error(found: np.ndarray, true: Exact) -> float:

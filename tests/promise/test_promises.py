@@ -1,5 +1,6 @@
 """The promises of `python -m tests.promise`, held on three of its cameras, without its clock."""
 
+import frames
 import pytest
 import random_cameras
 from promises import CAMERAS, estimates, idle_work, kept, made, truth, worth_leaving_out
@@ -74,6 +75,14 @@ def test_random_cameras_keep_every_tolerance(number, absent, tmp_path):
     for found in random_cameras.held(camera):
         assert found.mean <= found.tolerance, found
         assert found.variance <= 2 * found.tolerance, found
+
+
+@pytest.mark.parametrize("seed", [60007, 60023])
+def test_slopes_in_line_with_the_pixels(seed, tmp_path):
+    """Samples of half and an eighth of a pixel, blurred by less than a fifth of one, by rays."""
+    found = frames.measure("depth", seed, tmp_path)
+    assert not found.misses, found.text
+    assert all(found.mean[preset] <= said for preset, said in found.predicted.items()), found.text
 
 
 def test_cameras_with_every_effect(tmp_path):

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.backend import Processor
 from vcam_cli.devices.processor import Processor
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.pixel_signal import NeighborSharing, TemporalGain, Transport

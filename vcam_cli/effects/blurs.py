@@ -15,6 +15,7 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.effects.base import Effect
+from vcam_cli.physics.ray_spot import RaySpot
 
 PLACES = 3
 """Places of the field over which the contrast of a blur that changes over it is averaged."""
@@ -168,6 +169,11 @@ class RadialTransfer(Blur):
             Transfer (J, *shape of `frequency`) without unit.
         """
         return np.array([self.otf(frequency, float(w)) for w in wavelengths])
+
+    @property
+    def spot(self) -> RaySpot | None:
+        """The spot to which rays blur a point, where images behind it are elementary."""
+        return None
 
     def otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
         """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: (m, n)."""

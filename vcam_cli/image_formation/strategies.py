@@ -5,6 +5,7 @@
 - Sinusoids, and patterns that repeat whose harmonics up to the cut-off are few enough to be summed:
   each has its transfer. Exact (`harmonic_scenes.py`).
 - No blur in the lens or in the silicon: means over the photodetectors. Exact (`box_average.py`).
+- Small spots of rays before squares of light: the same, exact (`spot_average.py`).
 - No light in any color: none at the pixels.
 - Everything else: the cosine spectrum, multiplied by the transfer function and folded onto the
   pixels, as finely as the tolerance asks (`bandwidth.py`, `chart_cells.py`).
@@ -21,11 +22,13 @@ import numpy as np
 from vcam_cli import memory
 from vcam_cli.arrays import Array
 from vcam_cli.effects.base import of_kind
-from vcam_cli.effects.blurs import Blur, FieldTransfer, SeparableTransfer
+from vcam_cli.effects.blurs import Blur, FieldTransfer, RadialTransfer, SeparableTransfer
 from vcam_cli.effects.warps import Warp
+from vcam_cli.floats import rms
 from vcam_cli.image_formation.box_average import box_averages, point_values
 from vcam_cli.image_formation.estimates import memory_model
 from vcam_cli.image_formation.estimates.bandwidth import (
+    HIGHEST,
     LOWEST,
     axes,
     highest_passed,
@@ -55,8 +58,10 @@ from vcam_cli.image_formation.layers.cut_image import cut_image
 from vcam_cli.image_formation.layers.layered import layered_image
 from vcam_cli.image_formation.optical_path import Layer, Layers, OpticalPath, SpectrumReport
 from vcam_cli.image_formation.profile_scenes import profile_layers
+from vcam_cli.image_formation.spot_average import spot_averages
 from vcam_cli.image_formation.sub_exposures import sub_exposed_layers, sub_exposed_motion
 from vcam_cli.image_formation.transfer_tables import Tables, mixtures, tabulate
+from vcam_cli.physics.ray_spot import RaySpot
 from vcam_cli.scenes.base import ChartScene, HarmonicScene, SampledScene
 from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.image import ImageScene
@@ -116,6 +121,8 @@ def image_layers(path: OpticalPath, scene: AnyScene) -> tuple[Layers, SpectrumRe
         found = profile_layers(path, profile)
         if found is not None:
             return found
+    if (spot := _fine_spot(path, scene)) is not None:
+        return _spot_layers(path, scene, spot)
     return _filtered_layers(path, scene)
 
 
@@ -142,6 +149,37 @@ def _mean_layers(path: OpticalPath, scene: SampledScene) -> tuple[Layers, Spectr
         is_averaged=True,
         is_painted=painted,
         edge_seconds=scene.chart.edge_seconds if isinstance(scene, ChartScene) and painted else 0.0,
+        memory=needed,
+    )
+    return iter([Layer(lambda color, rows: signal[color, rows])]), report
+
+
+def _fine_spot(path: OpticalPath, scene: SampledScene) -> RaySpot | None:
+    """Return the spot of rays behind which squares of light have detail beyond `HIGHEST`.
+
+    It is None where there is another blur or motion, and where the spectrum ends before.
+    """
+    blurs = of_kind(path.transfer.effects, RadialTransfer)
+    alone = len(blurs) == len(path.transfer.effects) == 1 and not path.field
+    if not (alone and path.separable and path.averages_over_box) or scene.samples != "squares":
+        return None
+    return blurs[0].spot if highest_passed(path, scene) >= HIGHEST else None
+
+
+def _spot_layers(
+    path: OpticalPath, scene: SampledScene, spot: RaySpot
+) -> tuple[Layers, SpectrumReport]:
+    """Return means over the photodetectors' areas of what rays blur to small spots."""
+    g, level = path.geometry, path.transfer.level.T
+    needed = memory_model.box_average_bytes(math.prod(scene.shape), len(level), g, path.settings)
+    memory.require(needed, g.rows, g.columns)
+    both = axes(path, scene, 1.0)
+    signal = spot_averages(scene, level, g, both, spot, path.workers)
+    sharp = box_averages(scene, level, g, both, path.workers)
+    report = SpectrumReport(
+        is_averaged=True,
+        cells=math.prod(scene.shape),
+        changes={path.transfer.effects[0].name: max(map(rms, signal - sharp))},
         memory=needed,
     )
     return iter([Layer(lambda color, rows: signal[color, rows])]), report

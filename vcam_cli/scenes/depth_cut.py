@@ -177,14 +177,19 @@ def cut_depth(
 
 
 def _layer_radii(radius: Array, detail: Detail, allowed: float) -> tuple[Array, float]:
-    """Return the layers' radii, from the largest to the smallest, and the error between them."""
+    """Return the layers' radii, from the largest to the smallest, and the error between them.
+
+    What is in focus is a layer of its own. Light that spots of rays bring across an edge is
+    proportional to |r|, so mixtures of blurs on both sides of the focus err by the first order.
+    """
     high, low = float(radius.max()), float(radius.min())
     if is_flat(radius, detail, allowed):
         return np.array([(high + low) / 2]), allowed
     while True:
         radii = [high]
         while radii[-1] > low and len(radii) <= MOST_LAYERS:
-            radii.append(_next_radius(radii[-1], low, detail, allowed))
+            end = 0.0 if radii[-1] > 0 > low else low
+            radii.append(_next_radius(radii[-1], end, detail, allowed))
         if len(radii) <= MOST_LAYERS:
             return np.array(radii), allowed
         allowed *= 1.5

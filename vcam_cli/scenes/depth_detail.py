@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -12,22 +13,34 @@ from vcam_cli.arrays import Array
 
 BINS = 256
 """Frequencies of a power spectrum."""
+FINEST = 4.0
+"""Frequency up to which the edges of samples count, at least [cycles per pixel]. On samples in line
+with the pixels those beyond add a tenth to what blurs of a tenth of a pixel change."""
+BLOCKS = 64
+"""Neighboring terms of a spectrum along an axis that are taken together: so many in all, but at the
+lowest frequencies."""
 
 
 @dataclass(frozen=True)
 class Detail:
-    """What the pixels of a lens see of a picture's detail by length of the spatial frequency."""
+    """What the pixels of a lens see of a picture's detail by length of the spatial frequency.
+
+    Pixels cannot tell apart waves of each zone between multiples of their Nyquist frequency. Within
+    a zone mean squares add up, those of zones as if all of them met in phase: where samples are in
+    line with the pixels they do.
+    """
 
     frequency: Array
     """(n,) [cycles/m]."""
     power: Array
-    """Mean squares (n,) of the picture without its mean, relative to the square of full signal."""
+    """Mean squares (zones, n) of the picture without its mean, relative to the square of full
+    signal."""
     full: float
     """Full signal, relative to white."""
 
     def rms(self, transfer: Array) -> float:
-        """Return the rms, over full signal, of the detail behind a transfer (n,)."""
-        return float(np.sqrt((self.power * np.square(transfer)).sum()))
+        """Return the rms, over full signal, of the detail behind a transfer (n,), at most."""
+        return float(np.sqrt(self.power @ np.square(transfer)).sum())
 
     def blur_change(self, *parts: tuple[float, float]) -> float:
         """Return the rms, over full signal, of a sum of blurs: pairs of a factor and radius [m]."""
@@ -73,6 +86,7 @@ def picture_detail(
     aperture: tuple[float, float],
     lens: Callable[[Array], Array],
     full: float,
+    pixel: float,
 ) -> Detail:
     """Return the detail of a picture in the color of all its channels together.
 
@@ -88,6 +102,8 @@ def picture_detail(
         What the lens passes at frequencies (n,) [cycles/m] where it is in focus.
     full : float
         Full signal, relative to white.
+    pixel : float
+        Side of the pixels [m].
 
     Returns
     -------
@@ -96,17 +112,52 @@ def picture_detail(
     """
     squares = np.square(scipy.fft.dctn(picture.astype(np.float32), type=2, norm="ortho"))
     squares[0, 0] = 0
-    fy, fx = (np.arange(count) / (2 * count * pitch) for count in picture.shape)
+    times = max(math.ceil(2 * FINEST * pitch / pixel), 2)
+    axes = []
+    for axis, (count, width) in enumerate(zip(squares.shape, aperture[::-1], strict=True)):
+        starts = _starts(count)
+        squares = np.add.reduceat(squares, starts, axis=axis)
+        axes.append(_repeated(starts, count, times, pitch, width))
+    (fy, from_y, passed_y), (fx, from_x, passed_x) = axes
+    seen = squares[np.ix_(from_y, from_x)] * np.outer(passed_y, passed_x) / picture.size
+    zones = [np.floor(2 * f * pixel).astype(int) for f in (fy, fx)]
+    zone = zones[0][:, None] * (zones[1].max() + 1) + zones[1]
     length = np.hypot(fx[None, :], fy[:, None])
-    squares *= np.outer(np.square(np.sinc(fy * aperture[1])), np.square(np.sinc(fx * aperture[0])))
-    top = float(np.hypot(0.5, 0.5) / pitch)
-    bins = np.minimum((np.sqrt(length / top) * BINS).astype(int), BINS - 1).ravel()
-    power = np.bincount(bins, squares.ravel(), BINS) / picture.size
-    weighted = np.bincount(bins, (squares * length).ravel(), BINS) / picture.size
-    seen = power > 0
-    frequency = weighted[seen] / power[seen]
+    number = np.minimum((np.sqrt(length / length.max()) * BINS).astype(int), BINS - 1)
+    size = (int(zone.max()) + 1, BINS)
+    power = np.bincount((zone * BINS + number).ravel(), seen.ravel(), math.prod(size)).reshape(size)
+    weighted = np.bincount(number.ravel(), (seen * length).ravel(), BINS)
+    lit = weighted > 0
+    frequency = weighted[lit] / power.sum(axis=0)[lit]
     passed = np.square(lens(frequency))
-    return Detail(frequency, power[seen] * passed / (full**2 or 1.0), full)
+    return Detail(frequency, power[:, lit] * passed / (full**2 or 1.0), full)
+
+
+def _starts(count: int) -> Array:
+    """Return the first terms of blocks along an axis of a spectrum."""
+    return np.unique(
+        np.concatenate([np.arange(min(16, count)), np.arange(0, count, -(-count // BLOCKS))])
+    )
+
+
+def _repeated(
+    starts: Array, count: int, times: int, pitch: float, width: float
+) -> tuple[Array, Array, Array]:
+    """Return the blocks of the spectrum of squares of light, which repeats that of their samples.
+
+    They are frequencies [cycles/m], the numbers of the samples' blocks, and what squares and
+    photodetectors pass of their mean squares.
+    """
+    middle = (starts + np.append(starts[1:], count) - 1) / 2
+    own = np.arange(len(starts))
+    terms, source = [], []
+    for number in range(times):
+        backwards = number % 2 == 1
+        terms.append((number + 1) * count - middle if backwards else number * count + middle)
+        source.append(own)
+    f = np.concatenate(terms) / (2 * count * pitch)
+    passed = np.sinc(f * width) * np.sinc(f * pitch)
+    return f, np.concatenate(source), np.square(passed)
 
 
 def block_means(picture: Array, side: int) -> Array:

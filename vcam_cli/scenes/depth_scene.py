@@ -25,7 +25,7 @@ from vcam_cli.scenes.hyperspectral import Cube
 from vcam_cli.scenes.image import ImageScene, image_scene
 from vcam_cli.spectra import Spectrum
 
-SHARE = 0.3
+SHARE = 0.5
 """Part of the tolerance that the cuts between layers may use."""
 SLOPE_SHARE = 0.1
 """Part of the tolerance within which slopes count as steps, and that their samples may err."""
@@ -271,9 +271,9 @@ class DepthScene:
         Returns
         -------
         SlopeLayer or None
-            What they add; None where no slope counts.
+            What they add; None where no slope counts, and of a layer in focus.
         """
-        if self.rises is None:
+        if self.rises is None or not self.cut.radii[number]:
             return None
         shown = self.shown(number)
         return SlopeLayer(
@@ -399,4 +399,4 @@ def _brightness(flat: ImageScene) -> Array:
 def _detail(flat: ImageScene, view: View, blur: LensBlur, most: float = 1.0) -> Detail:
     light, pixel = _brightness(flat), min(view.pitch_x, view.pitch_y)
     full = min(full_signal(light, flat.pitch_x, pixel), most)
-    return picture_detail(light, flat.pitch_x, blur.aperture, blur.sharp, full)
+    return picture_detail(light, flat.pitch_x, blur.aperture, blur.sharp, full, pixel)

@@ -12,6 +12,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.blurs import RadialTransfer
 from vcam_cli.physics.aberration import paraboloid_transfer
+from vcam_cli.physics.ray_spot import RaySpot
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,11 @@ class Paraboloid(RadialTransfer):
     def reach(self) -> float:
         """How far from its place the blur throws light [m]."""
         return self.radius
+
+    @property
+    def spot(self) -> RaySpot:
+        """The paraboloid."""
+        return RaySpot(self.radius, 1)
 
     def cutoff(self, wavelength: float) -> float:
         """Return the frequency from which the transfer is zero, or inf [cycles/m]."""

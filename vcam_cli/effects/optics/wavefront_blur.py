@@ -21,7 +21,8 @@ from vcam_cli.effects.base import Effect, SignalLevels, switched_off
 from vcam_cli.effects.blurs import PlaneTransfer, RadialTransfer
 from vcam_cli.physics import aberration, diffraction, ray_blur, zernike
 from vcam_cli.physics.cache import ByteCache
-from vcam_cli.physics.zernike import Terms
+from vcam_cli.physics.ray_spot import RaySpot
+from vcam_cli.physics.zernike import DEFOCUS, Terms
 
 GREEN = 550e-9
 """Wavelength that descriptions refer to [m]."""
@@ -313,6 +314,14 @@ class SymmetricBlur(UniformBlur, RadialTransfer):
         if terms is None or not (terms or focus) or not zernike.is_symmetric(terms):
             return None
         return cls(Lens.from_camera(camera, geometry), terms, focus)
+
+    @property
+    def spot(self) -> RaySpot | None:
+        """The disc of rays of defocus alone; None of waves, and of other wavefronts."""
+        terms = zernike.combine(self.terms)
+        if self.lens.diffracts or self.focus is not None or [i for i, _ in terms] != [DEFOCUS]:
+            return None
+        return RaySpot(ray_blur.blur_radius(terms, self.lens.working_f_number), 0)
 
     def otf(self, frequency: Array, wavelength: float) -> Array:
         """Return the transfer at `frequency` [cycles/m] and `wavelength` [m]."""
