@@ -15,6 +15,7 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.effects.base import Effect
+from vcam_cli.effects.warps import Magnification
 from vcam_cli.physics.ray_spot import RaySpot
 
 PLACES = 3
@@ -283,6 +284,21 @@ class FieldTransfer(Effect):
             Blurs with their weights over the field.
         """
         return self.rings(count)
+
+    def magnifying(self, warps: Sequence[Magnification]) -> FieldTransfer | None:
+        """Return the blur with magnifications by wavelength in it, which then need no warps.
+
+        Parameters
+        ----------
+        warps : sequence of Magnification
+            These magnifications.
+
+        Returns
+        -------
+        FieldTransfer or None
+            The blur; None where it does not know them, or images by color are the plainer way.
+        """
+        return None
 
     @property
     def is_uniform(self) -> bool:

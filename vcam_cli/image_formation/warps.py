@@ -38,6 +38,7 @@ from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.temporal.sub_exposed_motion import SubExposedMotion
 from vcam_cli.effects.warps import ImageMotion, Magnification, StillWarp, Warp
 from vcam_cli.image_formation.estimates.bandwidth import highest_passed, margin, reach
+from vcam_cli.image_formation.estimates.lens_contrast import lens_contrast
 from vcam_cli.image_formation.optical_path import Layers, OpticalPath, SpectrumReport
 from vcam_cli.image_formation.strategies import image_layers
 from vcam_cli.scenes.base import Chart, ChartScene, Frame, HarmonicScene, Scene
@@ -189,6 +190,7 @@ def warped_layers(path: OpticalPath, scene: AnyScene) -> tuple[Layers, SpectrumR
     CannotDo
         Where memory does not suffice.
     """
+    path = _with_magnifying_blur(path)
     warps = Warps(of_kind(path.effects, Warp))
     if not warps.still:
         return image_layers(path, scene)
@@ -250,6 +252,19 @@ def _widest_cells(path: OpticalPath, sees: SmoothMap) -> float:
     return min(g.pitch_x, g.pitch_y) * min(widest, LARGEST_CELL)
 
 
+def _with_magnifying_blur(path: OpticalPath) -> OpticalPath:
+    """Return a path whose blur over the field has lateral color in it, where the blur is wider.
+
+    Each wavelength of a warp by color takes an image of its own: 6 of a double Gauss on a phone.
+    """
+    colors = tuple(w for w in of_kind(path.effects, Magnification) if w.knots)
+    blur = path.field.magnifying(colors) if path.field and colors else None
+    if blur is None:
+        return path
+    kept = (e for e in path.effects if e not in colors)
+    return replace(path, effects=tuple(blur if e is path.field else e for e in kept), optional=())
+
+
 def _without_still(path: OpticalPath, effects: Sequence[Effect]) -> OpticalPath:
     """Return a path with these effects but the still warps."""
     still = of_kind(effects, StillWarp)
@@ -278,9 +293,10 @@ def _share_of(path: OpticalPath, share: Array) -> OpticalPath:
     kept = share > 0
     transfer = path.transfer
     weights = transfer.weights[..., kept] * share[kept]
-    return replace(
-        path, transfer=replace(transfer, wavelengths=transfer.wavelengths[kept], weights=weights)
-    )
+    own = replace(transfer, wavelengths=transfer.wavelengths[kept], weights=weights)
+    # Errors of all groups add: each may use as much of the tolerance as it has of the light.
+    part = float(own.level.sum() / (transfer.level.sum() or 1.0))
+    return replace(path, transfer=own, full=path.full * part)
 
 
 def _joined(path: OpticalPath, reports: Sequence[SpectrumReport]) -> SpectrumReport:
@@ -501,8 +517,7 @@ class GroupError:
         pitch = max(g.pitch_x, g.pitch_y)
         top = min(transfer.cutoff, highest_passed(path, scene) / (2 * pitch))
         f = np.linspace(0, top, FREQUENCIES)[1:]
-        weights = path.judged_weights.sum(axis=0)
-        otf = (weights / (weights.sum() or 1.0)) @ transfer.otf_radial(f)
+        otf = lens_contrast(path, f)
         for effect in path.separable:
             otf = otf * np.maximum(np.abs(effect.along_x(f)), np.abs(effect.along_y(f)))
         return cls(energy.aligned + energy.oblique, f, np.square(otf))

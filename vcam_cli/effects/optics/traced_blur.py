@@ -7,6 +7,7 @@ wavefronts throw rays: a ray lands dW/dx beside the chief ray's point, x in dire
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from threading import Lock
@@ -28,6 +29,7 @@ from vcam_cli.effects.base import SignalLevels, switched_off
 from vcam_cli.effects.blurs import FieldTransfer, PlaneTransfer, Zone
 from vcam_cli.effects.optics.field_blur import ZoneWeight
 from vcam_cli.effects.optics.wavefront_blur import GREEN, AberrationBlur, largest_loss
+from vcam_cli.effects.warps import Magnification
 from vcam_cli.lenses.fields import View
 from vcam_cli.lenses.wavefronts import ORDER, PlaceWavefront
 from vcam_cli.physics import shaped_pupil
@@ -45,6 +47,11 @@ disk it is a thousandth."""
 FEWEST_NODES, NODES_PER_CYCLE, MOST_BLUR_CYCLES = 5, 3.0, 4.0
 """Wavelengths at which transfers are computed, and further ones for each cycle by which the blur's
 radius changes over the band at the highest frequency; of more cycles little contrast is left."""
+STEPS_PER_PERIOD = 16.0
+"""Steps of tables of harmonics in one period of the phase of the blur's reach: polynomials through
+six entries err by 2e-5 of the light that falls there."""
+STENCIL = 6
+"""Entries of such a table through which a polynomial goes."""
 RAYS = 48
 """Rays across a pupil where they are traced without diffraction."""
 
@@ -58,16 +65,18 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
     longest: float
     shortest: float
     """Range of wavelengths at which it is computed [m]."""
-    color: WavelengthTable
-    """Magnification by wavelength, which `lateral_color` simulates."""
+    color: WavelengthTable | None
+    """Magnification by wavelength, which `lateral_color` simulates; None where this blur does."""
     angle: float = 0.0
     kept: dict[float, OtfGrid] = field(default_factory=dict)
     """Grids by wavelength, shared by all angles."""
+    tables: dict[str, Array] = field(default_factory=dict)
+    """Harmonics at the nodes, over evenly spaced frequencies from 0."""
     lock: Lock = field(default_factory=Lock)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what is pickled: neither the lock nor tables that can be computed again."""
-        return {**self.__dict__, "kept": {}, "lock": None}
+        return {**self.__dict__, "kept": {}, "tables": {}, "lock": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Take a pickled state, with a lock of its own."""
@@ -133,17 +142,47 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
 
     def harmonics(self, frequency: Array, wavelengths: Array) -> Array:
         """Return the transfer (J, n, m) as harmonics of the direction, for the angle 0."""
-
-        def values(angles: Array) -> Array:
-            fx, fy = (np.multiply.outer(frequency, along(angles)) for along in (np.cos, np.sin))
-            return np.array([self._at_node(fx, fy, node) for node in range(len(self._nodes))])
-
-        found = direction_harmonics(values)
         shares = np.array([lagrange(self._nodes, 1 / w) for w in wavelengths.tolist()])
-        between = np.tensordot(shares, found, 1)
+        between = np.tensordot(shares, self._harmonics_at_nodes(frequency), 1)
         for part, wavelength in zip(between, wavelengths.tolist(), strict=True):
             part[frequency >= self.cutoff(wavelength)] = 0
         return np.asarray(between)
+
+    def _harmonics_at_nodes(self, frequency: Array) -> Array:
+        """Return the harmonics (nodes, n, m), from a table where many are requested.
+
+        Light in parts of the spectrum, and a frame that is computed again, share the table.
+        """
+        step = 1 / (STEPS_PER_PERIOD * self.reach)
+        count = math.ceil(float(frequency.max()) / step) + STENCIL
+        if len(frequency) < count // 2:
+            return self._direct_harmonics(frequency)
+        with self.lock:
+            known = self.tables.get("harmonics")
+        start = 0 if known is None else known.shape[1]
+        if start < count:
+            found = self._direct_harmonics(step * np.arange(start, count))
+            if known is not None:
+                most = max(known.shape[2], found.shape[2])
+                known, found = (_padded(part, most) for part in (known, found))
+                found = np.concatenate([known, found], axis=1)
+            known = found
+            with self.lock:
+                self.tables["harmonics"] = known
+        assert known is not None
+        return _between(known, frequency / step)
+
+    def _direct_harmonics(self, frequency: Array) -> Array:
+        def values(angles: Array) -> Array:
+            # A wavefront even in y: H(pi - theta) is the conjugate of H(theta).
+            half = angles[angles < (1 + 1e-9) * np.pi / 2]
+            fx, fy = (np.multiply.outer(frequency, along(half)) for along in (np.cos, np.sin))
+            found = np.array([self._at_node(fx, fy, node) for node in range(len(self._nodes))])
+            first = 1 if angles[0] == 0 else 0
+            mirrored = found[..., first : first + len(angles) - len(half)]
+            return np.concatenate([found, mirrored[..., ::-1].conj()], axis=-1)
+
+        return direction_harmonics(values)
 
     def mean_error(self, signal: SignalLevels) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
@@ -190,6 +229,8 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
         """Return how far outwards a color lies beside what `lateral_color` moves it to [m]."""
         known, place = self.wavefront.field, self.wavefront.place
         found = float(lagrange(known.wavenumbers, 1 / wavelength) @ known.shifts[place])
+        if self.color is None:
+            return found
         return found - float(self.color.at(wavelength)) * float(known.heights[place])
 
     def _by_waves(self, fx: Array, fy: Array, wavelength: float) -> Array:
@@ -245,6 +286,8 @@ class TracedBlur(AberrationBlur, FieldTransfer):
     longest: float
     """Range of wavelengths [m]."""
     diffracts: bool
+    has_color: bool = False
+    """Whether it displaces by the wavelength all that the lens does."""
 
     reference = "traced: Welford 1986, chapters 4 and 7; Hopkins 1985, doi:10.1364/AO.24.002491"
 
@@ -266,6 +309,22 @@ class TracedBlur(AberrationBlur, FieldTransfer):
         return (
             f"{self.view.lens.name}, traced: center {center.describe()}; corner {corner.describe()}"
         )
+
+    @property
+    def _color(self) -> WavelengthTable:
+        return lateral_color(self.view, self.half_diagonal, self.shortest, self.longest)
+
+    def magnifying(self, warps: Sequence[Magnification]) -> TracedBlur | None:
+        """Return the blur with the lens's lateral color in it, where that is the plainer way."""
+        if [warp.name for warp in warps] != ["lateral_color"] or self.has_color:
+            return None
+        values = [value for _, value in self._color.points]
+        apart = self.half_diagonal * (max(values) - min(values))
+        return self._magnifying if apart <= self.reach else None
+
+    @cached_property
+    def _magnifying(self) -> TracedBlur:
+        return replace(self, has_color=True)
 
     @property
     def reach(self) -> float:
@@ -348,7 +407,7 @@ class TracedBlur(AberrationBlur, FieldTransfer):
             Where the lens forms no image.
         """
         found = wavefronts(self.view, tuple(heights.tolist()), self.shortest, self.longest)
-        color = lateral_color(self.view, self.half_diagonal, self.shortest, self.longest)
+        color = None if self.has_color else self._color
         return tuple(
             PlaceBlur(found.at(i), self.diffracts, self.longest, self.shortest, color)
             for i in range(len(heights))
@@ -357,3 +416,23 @@ class TracedBlur(AberrationBlur, FieldTransfer):
     @cached_property
     def _kept(self) -> dict[int, tuple[PlaceBlur, ...]]:
         return {}
+
+
+def _padded(harmonics: Array, count: int) -> Array:
+    """Return harmonics (..., m) with further ones that are 0."""
+    rest = [(0, 0)] * (harmonics.ndim - 1)
+    return np.pad(harmonics, [*rest, (0, count - harmonics.shape[-1])])
+
+
+def _between(table: Array, position: Array) -> Array:
+    """Return a table (w, entries, m) at positions (n,) between its entries, by polynomials."""
+    first = np.clip(position.astype(int) - STENCIL // 2 + 1, 0, table.shape[1] - STENCIL)
+    at = position - first
+    total = np.zeros((len(table), len(position), table.shape[2]), table.dtype)
+    for own in range(STENCIL):
+        weight = np.ones(len(position))
+        for other in range(STENCIL):
+            if other != own:
+                weight *= (at - other) / (own - other)
+        total += weight[:, None] * table[:, first + own]
+    return total

@@ -24,6 +24,7 @@ import scipy.fft
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.image_formation.estimates.lens_contrast import lens_contrast
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.scenes.base import ChartScene
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region
@@ -158,9 +159,7 @@ class CellError:
     def _table(self) -> tuple[Array, Array]:
         """Frequencies (n,) [cycles/m], and what the lens passes of the color of most light."""
         f = np.linspace(0, self.top, 8 * FREQUENCIES + 1)
-        weights = self.path.judged_weights.sum(axis=0)
-        otf = (weights / (weights.sum() or 1.0)) @ self.path.transfer.otf_radial(f)
-        return f, np.square(otf)
+        return f, np.square(lens_contrast(self.path, f))
 
     def _passed(self, fx: Array, fy: Array) -> Array:
         """Return the squared transfer at frequencies of one shape [cycles/m]."""

@@ -1,0 +1,62 @@
+"""The contrast that a lens leaves where it is sharpest, by which cells and colors are chosen.
+
+C(f) = max over places and directions of |sum over wavelengths of w(l) H(f, l)|
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vcam_cli.arrays import Array
+from vcam_cli.effects.base import of_kind
+from vcam_cli.effects.blurs import Blur, PlaneTransfer, RadialTransfer
+from vcam_cli.image_formation.optical_path import OpticalPath
+from vcam_cli.image_formation.transfer_functions import Transfer
+
+TURNS = 2
+"""Directions in half a turn over the highest harmonic: the largest contrast is known to 10 %."""
+
+
+def lens_contrast(path: OpticalPath, frequency: Array) -> Array:
+    """Return the contrast of waves, in the color with most light.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    frequency : Array
+        Spatial frequencies (n,) [cycles/m].
+
+    Returns
+    -------
+    Array
+        Contrast (n,) without unit: of blurs that depend on |f| alone, and of the one that changes
+        over the field.
+    """
+    transfer, weights = path.transfer, path.judged_weights.sum(axis=0)
+    if not path.field_rings:
+        mean = (weights / (weights.sum() or 1.0)) @ transfer.otf_radial(frequency)
+        return np.asarray(mean)
+    one = Transfer(transfer.wavelengths, weights[None, None], transfer.radial_blurs)
+    light = one.with_half_the_wavelengths()
+    share = light.weights[0, 0] / (light.weights.sum() or 1.0)
+    before = share[:, None] * light.otf_radial(frequency)
+    found = [
+        _contrast(ring.blur, before, frequency, light.wavelengths) for ring in path.field_rings
+    ]
+    return np.asarray(np.max(found, axis=0))
+
+
+def _contrast(blur: Blur, before: Array, frequency: Array, wavelengths: Array) -> Array:
+    """Return the largest contrast in any direction behind a blur, from what lies before (J, n)."""
+    if radial := of_kind([blur], RadialTransfer):
+        return np.asarray(
+            np.abs((before * radial[0].spectral_otf(frequency, wavelengths)).sum(axis=0))
+        )
+    directed = of_kind([blur], PlaneTransfer)[0]
+    parts = np.einsum("jn,jnm->nm", before, directed.harmonics(frequency, wavelengths))
+    orders = np.arange(parts.shape[1])
+    angles = np.arange(TURNS * len(orders)) * (np.pi / (TURNS * len(orders)))
+    waves = parts[:, :, None] * np.exp(1j * np.multiply.outer(orders, angles))
+    values = waves[:, ::2].real.sum(axis=1) + 1j * waves[:, 1::2].imag.sum(axis=1)
+    return np.asarray(np.abs(values).max(axis=1))
