@@ -25,7 +25,7 @@ from vcam_cli.devices.processor import Processor, require
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.pixel_signal import TemporalGain, Transport
 from vcam_cli.effects.signal_chain import noise_sources
-from vcam_cli.effects.warps import Warp
+from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.errors import BadInput, CannotDo, bad
 from vcam_cli.files.images.color import decode_srgb
 from vcam_cli.floats import own_float_errors
@@ -308,7 +308,7 @@ def ready(
 def _check_times(solved: Solved, light: DeviceLight | ProcessorLight, asked: _Asked) -> None:
     """Raise CannotDo where light depends on an exposure time that frames do not share."""
     timed = of_kind(solved.effects.enabled, TemporalGain, Transport)
-    moving = [w for w in of_kind(solved.effects.enabled, Warp) if w.changes_with_time]
+    moving = of_kind(solved.effects.enabled, ImageMotion)
     if (timed or moving) and (asked.times is not None or solved.exposure.auto is not None):
         names = ", ".join(effect.name for effect in (*timed, *moving))
         raise CannotDo(

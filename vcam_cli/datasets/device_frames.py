@@ -22,7 +22,7 @@ from vcam_cli.datasets.frame_work import NPZ, FrameJob, noise_labels
 from vcam_cli.devices.processor import Processor
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.pixel_signal import TemporalGain, Transport
-from vcam_cli.effects.warps import Warp
+from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.errors import BadInput, CannotDo
 from vcam_cli.files.frame_archive import archive_bytes
 from vcam_cli.files.report import to_json
@@ -159,7 +159,7 @@ def _refuse_timed(taker: BatchCamera) -> None:
     """Raise CannotDo for light that depends on the exposure time."""
     effects = taker.solved.effects.enabled
     timed = [*of_kind(effects, TemporalGain, Transport)]
-    timed += [warp for warp in of_kind(effects, Warp) if warp.changes_with_time]
+    timed += of_kind(effects, ImageMotion)
     if timed:
         names = ", ".join(effect.name for effect in timed)
         raise CannotDo(f"{names}: the light depends on the exposure time", "use --device cpu")

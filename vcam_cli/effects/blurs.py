@@ -7,7 +7,7 @@ sums to 1, H(f) = integral h(x) exp(-2 pi i f x) dx has H(0) = 1 and no magnitud
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, Literal
 
 from vcam_cli.files.atomic import write_whole
 
@@ -146,7 +146,7 @@ def plot_figure(
     path: Path | str,
     size: tuple[float, float],
     dpi: int = 150,
-    layout: str | None = "constrained",
+    layout: Literal["constrained"] | None = "constrained",
 ) -> Iterator[Any]:
     """Yield a Matplotlib figure of the common style, and write it when the block ends.
 

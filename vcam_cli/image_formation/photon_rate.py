@@ -285,9 +285,17 @@ def on_mosaics(
             glare = glares[number - 1]
             found.append(partial(spread_over_mosaic, mosaic=path.mosaic, glare=glare))
         if group:
-            maps = (e.gain(*centers) / (e.on_axis or 1.0) for e in group)
-            product = np.prod(np.broadcast_arrays(*maps), axis=0).astype(dtype)
-            found.append(partial(_scale, factor=put(product)))
+            product = np.ones((1, *map(len, centers[::-1])), dtype)
+            for gain in group:
+                _attenuate(
+                    product,
+                    gain,
+                    (centers[0], centers[1]),
+                    path.mosaic,
+                    0,
+                    1 / (gain.on_axis or 1.0),
+                )
+            found.append(partial(_scale, factor=put(product[0])))
     return tuple(found)
 
 
