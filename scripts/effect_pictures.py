@@ -47,7 +47,7 @@ class Example:
     without: tuple[str, ...] = ()
     """What is changed instead for the photograph at the left; () where the effect is left out."""
     frames: int = 1
-    """The photograph is the last of so many frames, at `FPS`."""
+    """Frames of the sequence, at `FPS`; the photograph is the last."""
 
 
 def _chart(name: str) -> tuple[str, ...]:

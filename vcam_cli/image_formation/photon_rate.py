@@ -285,16 +285,10 @@ def on_mosaics(
             glare = glares[number - 1]
             found.append(partial(spread_over_mosaic, mosaic=path.mosaic, glare=glare))
         if group:
-            product = np.ones((1, *map(len, centers[::-1])), dtype)
+            product: Array = np.ones((1, *map(len, centers[::-1])), dtype)
             for gain in group:
-                _attenuate(
-                    product,
-                    gain,
-                    (centers[0], centers[1]),
-                    path.mosaic,
-                    0,
-                    1 / (gain.on_axis or 1.0),
-                )
+                scale = 1 / (gain.on_axis or 1.0)
+                _attenuate(product, gain, (centers[0], centers[1]), path.mosaic, 0, scale)
             found.append(partial(_scale, factor=put(product[0])))
     return tuple(found)
 

@@ -307,7 +307,7 @@ def codes(
     electrons : Array
         Signal (..., rows, columns); it may be reused [electrons].
     effects : iterable of Effect
-        Effects, of which those on electrons behind the well count.
+        Effects; those on electrons behind the well count.
     adc : Quantizer
         The ADC.
     here : mapping

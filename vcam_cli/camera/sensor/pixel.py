@@ -232,7 +232,7 @@ class Readout(Model):
 
 _MAP = (
     "in addition to the drawn pattern; an image or NPY file of one channel, as large as the array"
-    " or larger, of which the center is taken"
+    " or larger; its center is taken"
 )
 
 
