@@ -74,14 +74,20 @@ CASES: dict[str, Case] = {
         {"scene.source": WAVE},
         wavelengths=(380e-9, 550e-9, 1e-3),
     ),
-    "depth": Case(two_layers("0.5 m"), two_layers("1 m")),
+    "depth": Case(
+        two_layers("0.5 m"),
+        two_layers("1 m"),
+        {"scene.radiance": radiance_for(900), "array.rows": 8},
+    ),
     "motion": Case(
         {"scene.camera_motion": {"pan": "20 deg/s"}},
         {"scene.camera_motion": {"pan": "0 deg/s"}},
         {"scene.source": WAVE},
     ),
     "distortion": Case(
-        {"optics.distortion": {"k1": -25}}, {"optics.distortion": "none"}, {"scene.source": WAVE}
+        {"optics.distortion": {"k1": -25}},
+        {"optics.distortion": "none"},
+        {"scene.source": WAVE, "array.rows": 8},
     ),
     "lateral_color": Case(
         {"optics.lateral_color": {"table": {500: "1 %", 600: "2 %"}}},
