@@ -19,7 +19,6 @@ from fuzz import SLOW, deadline
 
 from vcam_cli import units
 from vcam_cli.camera.camera import Camera
-from vcam_cli.config import shipped
 from vcam_cli.config.model import Model
 from vcam_cli.config.quantities import LEAST_SIZE, MOST_SIZE, Numeric, Quantity, Whole
 from vcam_cli.errors import BadInput, CannotDo, dotted_path
@@ -164,8 +163,3 @@ def of_frame(camera: Camera) -> tuple[str, str]:
     wrong = [name for name, value in arrays.items() if not np.isfinite(value).all()]
     wrong += [name for name, value in result.metrics.items() if math.isnan(value)]
     return ("bug", f"not finite: {wrong}") if wrong else ("frame", "")
-
-
-def all_cases() -> list[Case]:
-    """Of every shipped camera."""
-    return [case for name in shipped.names("cameras") for case in cases(name)]

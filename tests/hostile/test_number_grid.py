@@ -3,12 +3,12 @@
 from pathlib import Path
 
 import pytest
-from number_grid import all_cases, cases, outcome
+from number_grid import cases, outcome
 
 from vcam_cli.config import shipped
 
-SAMPLE = 80
-"""Cases of the quick slice, evenly spread over all of them."""
+STRIDE = 7919
+"""A prime: cases of the quick slice are that far apart in the lists of successive cameras."""
 
 
 def wrong(chosen, folder: Path) -> list[str]:
@@ -17,11 +17,10 @@ def wrong(chosen, folder: Path) -> list[str]:
 
 
 def test_a_slice_of_the_grid(tmp_path) -> None:
-    """Of every camera, and nearly every key."""
-    every = all_cases()
-    chosen = [every[i * len(every) // SAMPLE] for i in range(SAMPLE)]
-    assert {case.camera for case in chosen} == set(shipped.names("cameras"))
-    assert len({case.path for case in chosen}) > SAMPLE / 3
+    """One case of every camera, and most of other keys."""
+    every = map(cases, shipped.names("cameras"))
+    chosen = [found[number * STRIDE % len(found)] for number, found in enumerate(every)]
+    assert len({case.path for case in chosen}) > len(chosen) / 2
     assert wrong(chosen, tmp_path) == []
 
 
