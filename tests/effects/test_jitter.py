@@ -63,3 +63,9 @@ def test_none_without_a_lens(tmp_path):
     }
     with pytest.raises(BadInput, match="bare sensor"):
         check_motion(camera(tmp_path, bare))
+
+
+def test_almost_all_of_the_light_stays_within_its_reach():
+    """All but 3e-4 of it: exp(-r^2 / 2 sigma^2) of a normal distribution lies beyond r."""
+    jitter = Jitter(2e-6, 5e-6)
+    assert 1e-4 < np.exp(-((jitter.reach / 2e-6) ** 2) / 2) < 1e-3

@@ -206,3 +206,11 @@ def test_what_is_no_transfer_is_refused_with_its_place(table, message, tmp_path)
 def test_what_is_measured_stands_alone(beside, tmp_path):
     with pytest.raises(BadInput, match="which includes all aberrations"):
         with_file(tmp_path, text(), **beside)
+
+
+def test_most_of_the_light_lies_within_its_reach(tmp_path):
+    """Nine tenths: of a normal distribution within sigma sqrt(2 ln 10), to the steps of 8 %."""
+    sigma = 5e-6
+    rows = [(f, math.exp(-2 * (math.pi * sigma * f * 1e3) ** 2)) for f in range(0, 122, 2)]
+    blur = blur_of(tmp_path, text([*rows, (150, 0)]))
+    assert blur.reach == pytest.approx(sigma * math.sqrt(2 * math.log(10)), rel=0.08)

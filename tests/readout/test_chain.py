@@ -72,3 +72,17 @@ def test_electrons_stay_below_the_well_whatever_the_adc_adds(tmp_path) -> None:
     frame = simulate(camera(tmp_path, NOISY | full)).frame
     assert frame.electrons.max() == frame.electrical.full_well
     assert frame.dn.std() == pytest.approx(2, rel=0.05)
+
+
+def test_few_full_pixels_read_less_than_saturation(tmp_path) -> None:
+    """Of the ADC's normal noise 1 in 741 is more than 3 standard deviations below its mean."""
+    full = {
+        "scene.radiance": radiance_for(1e6),
+        "pixel.readout": {"full_well": "10 ke", "voltage_swing": "1 V"},
+        "adc": {"bits": 12, "offset": "20 DN", "gain": "0.2 DN/e", "noise": "20 DN"},
+        "array.rows": 200, "array.columns": 200, "effects": "all",
+    }  # fmt: skip
+    result = simulate(camera(tmp_path, full))
+    below = int(np.sum(result.dn < result.frame.chain.saturated_dn))
+    expected = result.dn.size * 0.00135
+    assert below == pytest.approx(expected, abs=5 * math.sqrt(expected))
