@@ -184,7 +184,13 @@ def test_meters_a_second_need_a_distance(tmp_path):
         checks.load(str(file))
 
 
-def test_a_scene_may_overtake_the_shutter():
+def test_a_scene_may_overtake_the_shutter(tmp_path):
     """What moves faster than lines are read is seen reversed, in finite numbers."""
+    edge = {"kind": "chart", "chart": "slanted-edge", "motion": {"y": "50 m/s"}}
+    assert np.isfinite(mean(tmp_path, {"scene.source": edge}, ROLLING)).all()
+
+
+@pytest.mark.long
+def test_layers_may_overtake_the_shutter():
     sets = ["scene.source.motion.y=1000 km/s", "array.rows=12", "array.columns=16"]
     assert np.isfinite(simulate(load("street", sets)).mean_electrons).all()
