@@ -12,7 +12,7 @@ import math
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -159,16 +159,24 @@ class Row:
         return str(self.given["says"]).format(value)
 
 
-def rows() -> list[Row]:
+@cache
+def rows() -> tuple[Row, ...]:
     """Return all rows in the order of the thesis."""
     found = []
     for given in yaml.safe_load(ROWS.read_text("utf-8")):
         study: dict[str, Any] = {}
         if "expect" in given:
             name, _, item = given["expect"].partition("/")
-            text = (ROOT / f"configs/studies/{name}.yaml").read_text("utf-8")
-            study = yaml.safe_load(text)["expect"][item]
+            study = _expectations(name)[item]
         found.append(Row(given, study))
+    return tuple(found)
+
+
+@cache
+def _expectations(study: str) -> dict[str, Any]:
+    """Return what a shipped study expects, by name."""
+    text = (ROOT / f"configs/studies/{study}.yaml").read_text("utf-8")
+    found: dict[str, Any] = yaml.safe_load(text)["expect"]
     return found
 
 
