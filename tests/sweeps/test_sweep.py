@@ -160,7 +160,7 @@ def test_two_processes_share_a_folder(long, tmp_path):
     assert tables(out) == expected
 
 
-@pytest.mark.parametrize("first", [1, 2])
+@pytest.mark.parametrize("first", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_shares_that_finish_at_once_lose_no_row(first, tmp_path, monkeypatch):
     """One share computes and writes while the other, which began before it, is on its last point.
 
