@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.files.plots import COLORS, DASHES, MARK, MARKERS, SMALL, SMALLEST, plot_figure
+from vcam_cli.files.plots import COLORS, DASHES, MARK, MARKERS, SMALL, plot_figure
 from vcam_cli.files.tables import Cell
 from vcam_cli.sweeps.sweep_result import CaseOptimum
 
@@ -100,6 +100,7 @@ def _draw_panel(figure: Any, axes: Any, panel: Panel) -> None:
         axes.axvline(place, color=COLORS[color % len(COLORS)], lw=1, ls=MARK, zorder=1)
     for curve in panel.curves:
         _draw_curve(axes, curve)
+    _name_missing_optima(axes, panel.curves)
     if panel.image is not None:
         _draw_image(figure, axes, panel)
     if panel.is_square:
@@ -157,14 +158,24 @@ def _marker(series: int) -> str:
 def _draw_optimum(axes: Any, best: CaseOptimum, color: str) -> None:
     """Draw the cross and the interval of an optimum; without one, mark the best end."""
     if best.edge:
-        marker, side = ("<", "left") if best.edge == "low" else (">", "right")
+        marker = "<" if best.edge == "low" else ">"
         axes.plot(best.end, best.value, marker, ms=8, mfc="none", mec="black", mew=1.2, zorder=5)
-        aside = {"xytext": (0, -9), "textcoords": "offset points", "va": "top", "ha": side}
-        axes.annotate("no optimum", (best.end, best.value), fontsize=SMALLEST, **aside)
         return
     ends, values = [best.low, best.high], [best.value, best.value]
     axes.plot(ends, values, color=color, lw=3.2, alpha=0.45, zorder=4, solid_capstyle="butt")
     axes.plot(best.optimum, best.value, "x", ms=8, mew=1.8, color="black", zorder=5)
+
+
+def _name_missing_optima(axes: Any, curves: Sequence[Curve]) -> None:
+    """Write once at each end, below the lowest mark, that curves have no optimum there."""
+    missing = [c.optimum for c in curves if c.optimum is not None and c.optimum.edge]
+    for end in {best.end for best in missing}:
+        lowest = min((best for best in missing if best.end == end), key=lambda best: best.value)
+        side = "left" if lowest.edge == "low" else "right"
+        aside = {"xytext": (0, -9), "textcoords": "offset points", "va": "top", "ha": side}
+        axes.annotate("no optimum", (end, lowest.value), fontsize=6.5, **aside)
+    if missing:
+        axes.margins(y=0.12)  # room for the words
 
 
 def _draw_image(figure: Any, axes: Any, panel: Panel) -> None:
