@@ -32,6 +32,7 @@ from vcam_cli.fitting.traps import LEAST_FRAMES, Traps, find_traps
 from vcam_cli.progress import Observer, Silent
 from vcam_cli.quality.mtf import EdgeResponse
 from vcam_cli.verification.edges import edge_responses
+from vcam_cli.verification.frame_files import readouts_in
 from vcam_cli.verification.frame_sets import FrameSet
 from vcam_cli.verification.frames import color_block, paths, raise_if_any, stacks
 from vcam_cli.verification.model import Measurement
@@ -106,7 +107,12 @@ def _check(measurement: Measurement) -> None:
         remedy = "add {files: dark_*.tif, exposure: 10 ms, light: none}"
         problems.add("frames", "there are no dark frames", remedy)
     raise_if_any(problems, measurement)
-    paths(measurement)
+    several = {name for pages in paths(measurement).values() for name in readouts_in(pages[0])}
+    if several and not measurement.readout:
+        listed = sorted(several)
+        message = f"the frames hold merged codes, of {', '.join(listed)}: no one photon transfer"
+        remedy = f"add readout: {listed[0]}, and fit the others likewise"
+        raise bad("levels", message, remedy).with_places(measurement.locate)
 
 
 def _of_dark(out: Fit, found: Conditions, line: sensor.Dark, gain: Estimate) -> None:

@@ -25,6 +25,7 @@ from vcam_cli.simulation.simulate import prepare
 from vcam_cli.sweeps.point_effects import with_every_effect
 from vcam_cli.verification.frames import Stack, color_planes
 from vcam_cli.verification.model import Measurement
+from vcam_cli.verification.prediction import of_readout
 from vcam_cli.verification.stack_prediction import STACKS, Judged, compare, take_stack
 from vcam_cli.verification.stack_quantities import Quantity
 
@@ -90,7 +91,7 @@ def judge_edge(camera: Camera, stack: Stack, measurement: Measurement, number: i
         No edge is found, in the measured frames or in those predicted.
     """
     measured = edge_responses(stack.frames, measurement)
-    ready = _before_edge(camera, stack, measured)
+    ready = _before_edge(camera, stack, measured, measurement.readout)
     predicted = []
     for turn in range(STACKS):
         frames = take_stack(ready, len(stack.frames), number * STACKS + turn)
@@ -141,7 +142,9 @@ def _width(response: EdgeResponse) -> float:
     return float(ends[1] - ends[0]) / response.pitch
 
 
-def _before_edge(camera: Camera, stack: Stack, measured: dict[str, list[EdgeResponse]]) -> Prepared:
+def _before_edge(
+    camera: Camera, stack: Stack, measured: dict[str, list[EdgeResponse]], readout: str
+) -> Prepared:
     """Return the camera before an edge of the measured angle and levels, ready for frames."""
     first = next(iter(measured.values()))[0]
     slant = math.degrees(first.angle) % 180
@@ -154,7 +157,7 @@ def _before_edge(camera: Camera, stack: Stack, measured: dict[str, list[EdgeResp
         "quality": [],
         "output": {"render": "none"},
     }
-    ready, _ = prepare(with_every_effect(camera.with_(changes)), 1)
+    ready, _ = prepare(of_readout(with_every_effect(camera.with_(changes)), readout), 1)
     rate, dark = ready.rate.astype(np.float64), ready.dark_rate
     colors, gain = ready.mosaic.colors, ready.chain.system_gain
     for color, responses in measured.items():

@@ -70,7 +70,7 @@ def pages(path: Path) -> list[Page]:
     return [Page(path, number, len(numbers)) for number in numbers]
 
 
-def read_page(page: Page, colors: str) -> Array:
+def read_page(page: Page, colors: str, readout: str = "") -> Array:
     """Return the codes of a frame as they are stored, (rows, columns) where it has one channel.
 
     Parameters
@@ -79,6 +79,8 @@ def read_page(page: Page, colors: str) -> Array:
         The frame.
     colors : str
         Colors of the smallest block that repeats, row by row, as the measurement has them.
+    readout : str, optional
+        Readout whose codes an EXR file holds beside others, in the channel dn.READOUT.
 
     Raises
     ------
@@ -104,10 +106,20 @@ def read_page(page: Page, colors: str) -> Array:
         _check_pixels(spec.width * spec.height)
         check_size(spec, spec.nchannels)
         if source.format_name() == "openexr":
-            return _read_exr(path, source)
+            return _read_exr(path, source, readout)
         data, _ = read_samples(source, spec, tuple(range(spec.nchannels)), page.number)
         data = data[:, :, 0] if data.shape[2] == 1 else data
         return _unscaled(data, _highest(path, spec, source.format_name()))
+
+
+def readouts_in(page: Page) -> tuple[str, ...]:
+    """Return the names of readouts whose codes a frame of vcam holds beside the merged ones."""
+    if page.path.suffix.lower() != ".exr":
+        return ()
+    with open_image(page.path) as source:
+        names = source.spec().channelnames
+    found = (name.removeprefix("dn.") for name in names if name.startswith("dn."))
+    return tuple(name for name in found if name == "small" or name.startswith("gain"))
 
 
 def _check_pixels(count: int, each: int = 8) -> None:
@@ -134,13 +146,21 @@ _KINDS = {
 }  # fmt: skip
 
 
-def _read_exr(path: Path, source: Any) -> Array:
+def _read_exr(path: Path, source: Any, readout: str) -> Array:
     if source.seek_subimage(1, 0):
         raise UnusableFile("is an EXR of several parts", "save each frame as a separate file")
     try:
         channels, _ = read_exr(path)
     except BadInput as error:
         raise UnusableFile(error.problems[0].message) from None
+    several = [name.removeprefix("dn.") for name in channels if name.startswith("dn.")]
+    if readout in several:
+        return channels[f"dn.{readout}"]
+    if readout and several:
+        raise UnusableFile(
+            f"has no codes of {readout}, but of {', '.join(several)}",
+            f"write levels.readout: {several[0]}",
+        )
     if "dn" in channels:
         return channels["dn"]
     return next(iter(channels.values())) if len(channels) == 1 else np.zeros((1, 1, 2))

@@ -70,6 +70,12 @@ class Levels(Model):
     black: Annotated[float | None, Number(least=0, example="64", words={"auto": None})] = key(
         "code without light, to be checked; auto: estimated", example=64, default=None
     )
+    readout: Text = key(
+        "readout that the frames are of, where pixels are read several times in an exposure: gain1,"
+        " gain8, small; default the merged codes",
+        example="gain8",
+        default="",
+    )
 
 
 class MeasuredPixel(Model):

@@ -208,8 +208,9 @@ def _without_outliers(entry: FrameSet, label: str, files: list[Page], frames: Ar
 
 def _stored(page: Page, measurement: Measurement, number: int) -> Array:
     """Return the codes of a frame as they are in its file, (rows, columns)."""
+    colors = "".join(itertools.chain(*color_block(measurement)))
     try:
-        codes = read_page(page, "".join(itertools.chain(*color_block(measurement))))
+        codes = read_page(page, colors, measurement.readout)
     except (UnusableFile, OSError, ValueError, EOFError) as error:
         message = f"{page.name} cannot be read: {error}"
         raise _refusal(measurement, number, message, _FORMATS) from None

@@ -9,6 +9,8 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.lattice import places
+from vcam_cli.camera.derived.readouts import has_several
+from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.errors import Collector
 from vcam_cli.verification import stack_quantities
 from vcam_cli.verification.frame_sets import FrameSet
@@ -117,9 +119,12 @@ def quantities_of_colors(
 def _check(camera: Camera, measurement: Measurement) -> None:
     problems = Collector()
     assert measurement.levels is not None
-    bits = measurement.levels.bits
-    if bits != camera.adc.bits:
-        message = f"the frames have {bits} bits, and the camera's ADC {camera.adc.bits}"
+    bits, own = measurement.levels.bits, camera.adc.bits
+    if has_several(camera) and not measurement.readout:
+        own = electrical(camera).bits
+    if bits != own:
+        what = "ADC" if own == camera.adc.bits else "merged codes"
+        message = f"the frames have {bits} bits, and the camera's {what} {own}"
         problems.add(("levels", "bits"), message, "correct one of them")
     taken, known = colors(measurement), set(camera.array.colors or places(camera).colors)
     if taken != known:

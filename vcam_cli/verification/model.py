@@ -173,6 +173,11 @@ class Measurement(FileModel):
     source: Text = key("where the numbers come from", example="bench of ...", default="")
 
     @property
+    def readout(self) -> str:
+        """The readout that the frames are of; "" for the only one, or for merged codes."""
+        return self.levels.readout if self.levels else ""
+
+    @property
     def points(self) -> tuple[Point, ...]:
         """The entries that are mean signals."""
         return tuple(entry for entry in self.frames if isinstance(entry, Point))

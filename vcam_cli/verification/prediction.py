@@ -14,6 +14,7 @@ from vcam_cli import units
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.derived.lattice import places
+from vcam_cli.camera.derived.readouts import has_several, readouts
 from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.errors import bad
 from vcam_cli.simulation.frame import Frame
@@ -85,12 +86,51 @@ def _irradiance(camera: Camera, point: Point) -> str:
     return f"{point.photons / (per_joule * area * point.exposure)!r} W/m2"
 
 
-def predict(camera: Camera, point: Point) -> Signal:
+def of_readout(camera: Camera, readout: str) -> Camera:
+    """Return the camera as if it had one readout alone, of those of an exposure.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera, under its last conditions.
+    readout : str
+        Name of the readout; "" for the merged codes.
+
+    Returns
+    -------
+    Camera
+        The camera; itself where it reads its pixels once.
+
+    Raises
+    ------
+    BadInput
+        Where it has no such readout, or one of a photodiode whose share of the light is not known.
+    """
+    if not readout or not has_several(camera):
+        return camera
+    found = {each.name: each for each in readouts(camera)}
+    path = ("levels", "readout")
+    if readout not in found:
+        raise bad(path, f"{readout!r} is no readout of this camera", f"write {' or '.join(found)}")
+    one = found[readout]
+    if one.sensitivity == 1:
+        return one.camera
+    level = camera.scene.irradiance
+    if not isinstance(level, float):
+        message = "the small photodiode gets a share of the light, whose amount is not given"
+        raise bad(path, message, "give irradiance or photons, of flat frames alone")
+    scene = one.camera.scene.model_copy(update={"irradiance": level * one.sensitivity})
+    return one.camera.model_copy(update={"scene": scene})
+
+
+def predict(camera: Camera, point: Point, readout: str = "") -> Signal:
     """Return the mean raw signal that a camera file predicts of a measured condition.
+
+    readout: as `of_readout` takes it.
 
     Raises BadInput where the camera cannot be brought under the point's conditions.
     """
-    frame = simulate(conditions(camera, point)).frame
+    frame = simulate(of_readout(conditions(camera, point), readout)).frame
     electrons = frame.layout.binning_groups.join(frame.held_electrons)
     chosen = electrons[_pixels(frame, point.channel)].astype(np.float64)
     if point.signal.channel == "electrons":

@@ -29,7 +29,7 @@ from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.simulate import prepare
 from vcam_cli.sweeps.point_effects import with_every_effect
 from vcam_cli.verification.model import Point
-from vcam_cli.verification.prediction import conditions
+from vcam_cli.verification.prediction import conditions, of_readout
 from vcam_cli.verification.stack_quantities import Quantity
 
 STACKS = 40
@@ -70,6 +70,7 @@ def judge(
     shape: tuple[int, int],
     measure: Measure,
     number: int,
+    readout: str = "",
 ) -> list[Judged]:
     """Return the quantities of a stack beside those that a camera file predicts.
 
@@ -87,6 +88,8 @@ def judge(
         What gives the quantities of the middle of frames.
     number : int
         Number of the stack, which its seeds follow from.
+    readout : str, optional
+        As `prediction.of_readout` takes it.
 
     Raises
     ------
@@ -95,7 +98,7 @@ def judge(
     """
     # Shading is slow beside the whole array; all else is the same in a part of it.
     size = frames.shape[1:] if camera.pixel.fpn.shading is None else shape
-    here = with_every_effect(conditions(camera, point, size))
+    here = of_readout(with_every_effect(conditions(camera, point, size)), readout)
     ready, _ = prepare(here, 1)
     predicted = [
         measure(take_stack(ready, len(frames), number * STACKS + turn)) for turn in range(STACKS)

@@ -165,7 +165,8 @@ def verify(camera: Camera, measurement: Measurement, watch: Observer | None = No
         watch.step(done, len(taken))
         measure = partial(quantities_of_colors, measurement)
         judged[stack.number] = judge(
-            camera, stack.point, stack.frames, stack.shape, measure, stack.number
+            *(camera, stack.point, stack.frames, stack.shape, measure, stack.number),
+            readout=measurement.readout,
         )
     edges, more = _edges(camera, measurement)
     pooled = pool(_groups(measurement, judged, edges))
@@ -284,7 +285,7 @@ def _rows(
             point.channel,
             f"mean [{UNITS[point.signal.channel]}]",
             point.signal.value,
-            predict(camera, point).value,
+            predict(camera, point, measurement.readout).value,
             tolerance,
         )
         yield number, row
