@@ -15,8 +15,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vcam_cli.arrays import Array
+from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.blurs import SeparableTransfer
+from vcam_cli.image_formation.neighbor_sharing import Sharing
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.simulation.preparation import Prepared
 
@@ -99,7 +101,7 @@ def saturation_capacity(
 def system_mtf(
     ready: Prepared, color: int, frequency: Array, direction: tuple[float, float]
 ) -> Array:
-    """Return the MTF of optics, diffusion and aperture at the center, |H(f)| / H(0).
+    """Return the MTF of optics, diffusion, aperture and crosstalk at the center, |H(f)| / H(0).
 
     Parameters
     ----------
@@ -114,7 +116,41 @@ def system_mtf(
         Transfer, 1 at frequency 0.
     """
     effects = ready.solved.effects.mean_signal
-    return directional_mtf(ready.transfer, effects, color, frequency, direction)
+    found = directional_mtf(ready.transfer, effects, color, frequency, direction)
+    if ready.sharing is None:
+        return found
+    light = np.linalg.solve(ready.sharing.matrix, ready.white_rate)
+    return found * sharing_mtf(ready.sharing, ready.geometry, color, light, frequency, direction)
+
+
+def sharing_mtf(
+    sharing: Sharing,
+    geometry: Geometry,
+    color: int,
+    light: Array,
+    frequency: Array,
+    direction: tuple[float, float],
+) -> Array:
+    """Return the contrast of gray waves that crosstalk leaves in the pixels of a color.
+
+    Parameters
+    ----------
+    sharing : Sharing
+        What pixels give to their neighbors.
+    geometry : Geometry
+        Geometry of the array.
+    color, frequency, direction
+        As those of `directional_mtf`.
+    light : (C,) array
+        Light of the colors in even gray, before pixels share it, in any unit.
+
+    Returns
+    -------
+    (n,) array
+        Contrast, 1 at frequency 0.
+    """
+    fx, fy = frequency * direction[0], frequency * direction[1]
+    return np.abs(sharing.transfer(color, light, fx * geometry.pitch_x, fy * geometry.pitch_y))
 
 
 def directional_mtf(

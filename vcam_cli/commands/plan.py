@@ -168,6 +168,15 @@ def settings_line(report: dict[str, Any]) -> str:
     return f"settings   {', '.join(f'{name} {value}' for name, value in named.items())}"
 
 
+def mixing(matrix: dict[str, dict[str, float]]) -> str:
+    """Return what even light of the colors becomes, as a text."""
+    sums = (
+        f"{color} = {' + '.join(f'{share:.3g} {other}' for other, share in row.items())}"
+        for color, row in matrix.items()
+    )
+    return ", ".join(sums)
+
+
 def facts(
     report: dict[str, Any],
     geometry: dict[str, Any],
@@ -185,6 +194,7 @@ def facts(
     return [
         ("geometry", f"{geometry['rows']} x {geometry['columns']} {place}"),
         ("exposure", f"{exposure_time:.4g} s{several}"),
+        *([("crosstalk", mixing(report["color_mixing"]))] if "color_mixing" in report else []),
         *([("readout", frame_rate)] if frame_rate else []),
         ("accuracy", f"rms error within {100 * report['settings']['tolerance']:.3g} % of signal"),
         ("cost", f"about {seconds:.2g} s and {memory:.0f} MB"),

@@ -75,12 +75,62 @@ class Sharing:
         lit = [self.coupled(self.arriving((self.sites == k).astype(float))) for k in range(count)]
         return np.array([[light[self.sites == c].mean() for light in lit] for c in range(count)])
 
+    def transfer(self, color: int, light: Array, fx: Array, fy: Array) -> Array:
+        """Return the contrast that pixels of a color show of a gray wave, over that in front.
+
+        Parameters
+        ----------
+        color : int
+            Index of the color.
+        light : Array
+            Light (C,) of the colors in even gray, before pixels share it, in any unit.
+        fx, fy : Array
+            Spatial frequencies (n,) along x and y [cycles/pixel].
+
+        Returns
+        -------
+        Array
+            Contrast (n,), complex: sum_d w K(d) exp(-2 pi i f d) / sum_d w K(d), with w the light
+            of the pixel at -d and K(d) its shares, in the mean over the sites of the color.
+        """
+        if self.planes:
+            alone = [kernels[min(color, len(kernels) - 1)][None] for kernels in self._kernels]
+            return _of_waves(alone, np.zeros((1, 1), int), np.ones((1, 1)), fx, fy)[:, 0, 0]
+        waves = _of_waves(self._kernels, self.sites, light[self.sites], fx, fy)
+        even = _of_waves(self._kernels, self.sites, light[self.sites], np.zeros(1), np.zeros(1))
+        here = self.sites == color
+        found: Array = waves[:, here].mean(axis=1) / even[:, here].mean(axis=1)
+        return found
+
+    @property
+    def _kernels(self) -> tuple[Array, ...]:
+        """All kernels, in the order of action."""
+        return self.before if self.after is None else (*self.before, self.after)
+
     def _spread(self, signal: Array, kernels: Array) -> Array:
         if signal.ndim == 2:
             return spread(signal, kernels, self.sites)
         each = [kernels[min(c, len(kernels) - 1)] for c in range(len(signal))]
         even = np.zeros((1, 1), int)
         return np.array([spread(p, k[None], even) for p, k in zip(signal, each, strict=True)])
+
+
+def _of_waves(kernels: Sequence[Array], sites: Array, light: Array, fx: Array, fy: Array) -> Array:
+    """Return the amplitudes (n, P, Q) of waves at the sites of a block, behind its kernels.
+
+    `light` (P, Q) are those in front; kernels are (C, h, w), as in `spread`, fx and fy (n,) in
+    cycles per pixel.
+    """
+    out = np.broadcast_to(light, (len(fx), *light.shape)).astype(complex)
+    for shares in kernels:
+        gone, out = out, np.zeros_like(out)
+        own = shares[sites if len(shares) > 1 else np.zeros_like(sites)]
+        down, along = shares.shape[1] // 2, shares.shape[2] // 2
+        for i, j in np.ndindex(shares.shape[1:]):
+            moved = np.roll(own[..., i, j] * gone, (i - down, j - along), axis=(1, 2))
+            phase = np.exp(-2j * np.pi * (fx * (j - along) + fy * (i - down)))
+            out += phase[:, None, None] * moved
+    return out
 
 
 def array_sharing(

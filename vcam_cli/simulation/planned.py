@@ -48,7 +48,20 @@ class PlannedRun:
                 "readout_time": self.readout.readout_time,
                 "frames_per_second": self.frames_per_second,
             }
+        if self.color_mixing:
+            found["color_mixing"] = self.color_mixing
         return found | {"geometry": self.geometry}
+
+    @property
+    def color_mixing(self) -> dict[str, dict[str, float]]:
+        """Share of the light of each color in the signal of each, by crosstalk; {} without any."""
+        sharing, colors = self.ready.sharing, self.ready.mosaic.colors
+        if sharing is None or sharing.planes or len(colors) == 1:
+            return {}
+        return {
+            color: {other: float(share) for other, share in zip(colors, row, strict=True) if share}
+            for color, row in zip(colors, sharing.matrix, strict=True)
+        }
 
     def __repr__(self) -> str:
         """Return a line: name, effects that run, seconds and memory expected."""

@@ -173,7 +173,7 @@ def _name_missing_optima(axes: Any, curves: Sequence[Curve]) -> None:
         lowest = min((best for best in missing if best.end == end), key=lambda best: best.value)
         side = "left" if lowest.edge == "low" else "right"
         aside = {"xytext": (0, -9), "textcoords": "offset points", "va": "top", "ha": side}
-        axes.annotate("no optimum", (end, lowest.value), fontsize=6.5, **aside)
+        axes.annotate("no optimum", (end, lowest.value), fontsize=SMALLEST, **aside)
     if missing:
         axes.margins(y=0.12)  # room for the words
 

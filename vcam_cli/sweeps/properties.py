@@ -21,13 +21,14 @@ from vcam_cli.camera.derived.dark_current import dark_rate
 from vcam_cli.camera.derived.geometry import Geometry, geometry
 from vcam_cli.camera.derived.pixel_layout import detector
 from vcam_cli.camera.derived.process import process
-from vcam_cli.characterization.closed_form import directional_mtf
+from vcam_cli.characterization.closed_form import directional_mtf, sharing_mtf
 from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.optics.off_axis import OffAxis
 from vcam_cli.effects.pixel.pixel_vignetting import PixelVignetting
-from vcam_cli.effects.pixel_signal import Gain
+from vcam_cli.effects.pixel_signal import Gain, NeighborSharing
 from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.errors import bad
+from vcam_cli.image_formation.neighbor_sharing import array_sharing
 from vcam_cli.image_formation.pixel_response import scene_transfer
 from vcam_cli.physics import readout, vignetting
 from vcam_cli.scenes import light
@@ -152,8 +153,18 @@ def _mtf(camera: Camera, nyquist: float) -> list[Curves]:
     def transfer(effects: tuple[Effect, ...]) -> list[Array]:
         step = solved.settings.wavelength_step
         found = scene_transfer(solved.response, white, effects, step)
-        colors = range(len(mosaic.colors))
-        return [directional_mtf(found, effects, color, frequency, (1.0, 0.0)) for color in colors]
+        level = found.level[0]
+        sharing = array_sharing(
+            *(of_kind(effects, NeighborSharing), solved.response, white[0]),
+            *(mosaic, solved.layout.planes),
+        )
+        curves = []
+        for color in range(len(mosaic.colors)):
+            own = directional_mtf(found, effects, color, frequency, (1.0, 0.0))
+            if sharing is not None:
+                own *= sharing_mtf(sharing, solved.geometry, color, level, frequency, (1.0, 0.0))
+            curves.append(own)
+        return curves
 
     effects = solved.effects.mean_signal
     both = transfer(effects), transfer(tuple(e for e in effects if e.origin != "lens"))

@@ -16,11 +16,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Self
 
+import numpy as np
+
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.sensor.crosstalk import Kernel, Kernels
 from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.pixel_signal import NeighborSharing
+
+MIDDLE = 550e-9
+"""Wavelength at which its contrast is told [m]."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +43,8 @@ class Crosstalk(NeighborSharing):
     after: Kernel | None
     largest_share: float
     """Largest share of a pixel's signal that it gives away."""
+    pitch: tuple[float, float]
+    """Of the pixels, along x and y [m]."""
 
     name = "crosstalk"
     reference = (
@@ -65,15 +73,47 @@ class Crosstalk(NeighborSharing):
             kept *= 1 - (0.0 if kernels is None else kernels.largest_share)
         if kept == 1:
             return None
-        return cls(before, None if coupling is None else coupling.points[0][1], 1 - kept)
+        after = None if coupling is None else coupling.points[0][1]
+        return cls(before, after, 1 - kept, (geometry.pitch_x, geometry.pitch_y))
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
         parts = ["before charge is counted"] if self.before else []
         parts += ["by capacitance"] if self.after is not None else []
         share = f"{100 * self.largest_share:.3g} %"
-        return f"a pixel gives {share} of its signal to its neighbors, {' and '.join(parts)}"
+        nyquist = self.row_transfer(np.array([0.5 / self.pitch[0]]), MIDDLE)[0]
+        return (
+            f"a pixel gives {share} of its signal to its neighbors, {' and '.join(parts)}; MTF"
+            f" {nyquist:.3g} at Nyquist along a row"
+        )
+
+    def row_transfer(self, frequency: Array, wavelength: float) -> Array:
+        """Return the contrast (n,) that it leaves of gray waves along a row."""
+        out = np.ones(len(frequency), complex)
+        coupling = () if self.after is None else (np.array(self.after),)
+        for kernel in (*(_at(kernels, wavelength) for kernels in self.before), *coupling):
+            line = kernel.sum(axis=0)
+            places = (np.arange(len(line)) - len(line) // 2) * self.pitch[0]
+            out *= np.exp(-2j * np.pi * np.multiply.outer(frequency, places)) @ line
+        return np.abs(out)
 
     def mean_error(self, signal: SignalLevels) -> float | None:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         return self.largest_share * signal.full_signal
+
+
+def _at(kernels: Kernels, wavelength: float) -> Array:
+    """Return the kernel at a wavelength [m], in the size of the largest."""
+    found = [np.array(kernel) for _, kernel in kernels.points]
+    height, width = (max(kernel.shape[axis] for kernel in found) for axis in (0, 1))
+    same_size = np.array(
+        [
+            np.pad(k, [((height - k.shape[0]) // 2,) * 2, ((width - k.shape[1]) // 2,) * 2])
+            for k in found
+        ]
+    )
+    at = np.interp(wavelength, [w for w, _ in kernels.points], np.arange(len(found)))
+    low = min(int(at), len(found) - 1)
+    high = min(low + 1, len(found) - 1)
+    kernel: Array = same_size[low] + (at - low) * (same_size[high] - same_size[low])
+    return kernel
