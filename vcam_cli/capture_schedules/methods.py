@@ -17,6 +17,7 @@ import numpy as np
 
 from vcam_cli.capture_schedules.model import ScheduleStudy
 from vcam_cli.scheduling import full_noise, objective, shot_noise, weighted_schedules
+from vcam_cli.scheduling.brackets import bracket_bound, bracket_snr, optimal_bracket
 from vcam_cli.scheduling.comparison_schedules import (
     exponential_times,
     geometric_times,
@@ -37,6 +38,8 @@ from vcam_cli.scheduling.sensor import (
 )
 from vcam_cli.scheduling.weighted_snr import weighted_expected_snr
 
+BRACKET = "bracket"
+"""Exposures one after the other, each with charge of its own, within the captures' longest time."""
 Schedules = dict[int, Schedule]
 """Schedules by the number of captures."""
 Method = Callable[["Task", Sequence[int]], Schedules]
@@ -72,6 +75,8 @@ class MethodResult:
     def distinct_captures(self) -> int:
         """Number of captures that differ."""
         times = self.schedule.times
+        if self.method == BRACKET:  # equal exposures are taken one after the other
+            return len(times)
         return 1 + int(np.sum(np.diff(times) > times[1:] * SLACK))
 
 
@@ -242,6 +247,24 @@ def _weighted_schedules(task: Task, counts: Sequence[int]) -> Schedules:
     return judged
 
 
+def _brackets(task: Task, counts: Sequence[int]) -> Schedules:
+    found = {}
+    for n in counts:
+        total = _last_time(task, n)
+        planned = optimal_bracket(task.plan, n, total, task.sensor, task.constraints)
+        value = bracket_snr(task.pdf, planned.times, task.sensor)
+        found[n] = Schedule(planned.times, planned.photocurrents, value)
+    return found
+
+
+def _last_time(task: Task, count: int) -> float:
+    """Return the longest time that the methods share: the longest exposure, or the optimum's."""
+    last = task.sensor.max_time
+    if math.isinf(last):
+        last = float(task.optimum([count])[count].times[-1])
+    return max(last, task.first)
+
+
 def _heuristic_schedules(task: Task, counts: Sequence[int]) -> Schedules:
     return _schedules_of_photocurrents(
         task, {n: heuristic_photocurrents(task.plan, n) for n in counts}
@@ -275,10 +298,7 @@ def _method_of_rule(rule: Callable[[float, float, int], Floats]) -> Method:
     def method(task: Task, counts: Sequence[int]) -> Schedules:
         schedules = {}
         for n in counts:
-            last = task.sensor.max_time
-            if math.isinf(last):
-                last = float(task.optimum([n])[n].times[-1])
-            times = rule(task.first, max(last, task.first), n)
+            times = rule(task.first, _last_time(task, n), n)
             schedules[n] = task.judge(task.admissible_times(times, n))
         return schedules
 
@@ -294,6 +314,7 @@ METHODS: dict[str, Method] = {
     "sqp": _sqp,
     "sqp-assigned": _sqp_assigned,
     "weighted": _weighted_schedules,
+    BRACKET: _brackets,
 }
 
 
@@ -321,7 +342,9 @@ def find_schedules(task: Task, method: str, counts: Sequence[int]) -> list[Metho
 
 
 def _upper_bounds(task: Task, method: str, counts: Sequence[int]) -> dict[int, float]:
-    """Return the bounds of the mean SNR: one for all but the weighted estimate."""
+    """Return the bounds of the mean SNR: one for all but the weighted estimate and brackets."""
+    if method == BRACKET:
+        return {n: bracket_bound(task.pdf, _last_time(task, n), task.sensor) for n in counts}
     if method != "weighted":
         return dict.fromkeys(counts, task.bound)
     found = least_bounds(task.pdf, tuple(counts), task.sensor, task.constraints)

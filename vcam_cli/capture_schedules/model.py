@@ -36,6 +36,7 @@ METHODS = (
     "geometric",
     *RANDOM_STARTS,
     "weighted",
+    "bracket",
 )
 MOST_CAPTURES = 1000
 
@@ -226,7 +227,10 @@ class ScheduleStudy(Model):
         "numbers of captures", example=[2, 4, 8]
     )
     methods: Annotated[tuple[str, ...], words_of(METHODS, 1)] = key(
-        "methods that compute schedules", example=["optimal", "uniform"], default=("optimal",)
+        "methods that compute schedules; bracket: merged exposures one after the other, each with"
+        " charge of its own, within the longest time of the captures",
+        example=["optimal", "uniform"],
+        default=("optimal",),
     )
     segments: Annotated[
         tuple[int, ...],

@@ -40,6 +40,7 @@ METHOD_STYLES = {
     "sqp": (COLORS[5], "P"),
     "sqp-assigned": ("#8c510a", "*"),
     "weighted": ("#000000", "X"),
+    "bracket": ("#01665e", "h"),
 }
 """Color and marker of each method, the same in every plot."""
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from vcam_cli.capture_schedules import pdf_plots
 from vcam_cli.capture_schedules.charge_plot import plot_charge
-from vcam_cli.capture_schedules.methods import MethodResult, Task
+from vcam_cli.capture_schedules.methods import BRACKET, MethodResult, Task
 from vcam_cli.capture_schedules.model import DENSITIES
 from vcam_cli.capture_schedules.pdf_plots import (
     DISPLAYED,
@@ -66,7 +66,9 @@ def plot_gain(result: ScheduleResult, path: Path) -> None:
         grid = figure.add_gridspec(1, 2, width_ratios=(2.1, 1))
         axes = figure.add_subplot(grid[0, 0])
         _draw_gain_curves(axes, _curves_over_captures(result.found, task), ms=3.8, lw=1.1)
-        axes.axhline(task.largest_gain, color=GRAY, lw=0.9, ls=LIMIT, label="upper bound")
+        brackets = any(one.method == BRACKET for one in result.found)
+        named = "upper bound of captures" if brackets else "upper bound"
+        axes.axhline(task.largest_gain, color=GRAY, lw=0.9, ls=LIMIT, label=named)
         axes.set_title(result.study.model.name)
         axes.set_xlabel("number of captures")
         axes.set_ylabel(GAIN_LABEL)
@@ -281,7 +283,12 @@ def _draw_gain_curves(axes: Any, curves: Sequence[GainCurve], ms: float, lw: flo
 def _draw_capture_row(axes: Any, number: int, row: MethodResult, gain: float, size: float) -> None:
     """Draw the captures of a method as ticks, its gain beside them; times in units of `size`."""
     color, _ = METHOD_STYLES[row.method]
-    x = np.unique(row.schedule.times) / size
+    found, counts = np.unique(row.schedule.times, return_counts=True)
+    x = found / size
+    for at, many in zip(x, counts, strict=True):
+        if row.method == BRACKET and many > 1:  # equal exposures, one after the other
+            axes.annotate(f"{many} x", (at, number - 0.1), xytext=(4, 3), fontsize=7,
+                          textcoords="offset points")  # fmt: skip
     axes.hlines(number, x[0], x[-1], color=color, lw=0.6, alpha=0.5)
     axes.vlines(x, number - 0.33, number + 0.33, color=color, lw=1.7)
     axes.annotate(f"{gain:.4g}", (1.01, number), xycoords=("axes fraction", "data"), va="center",

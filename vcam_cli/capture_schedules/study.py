@@ -253,7 +253,7 @@ class _StudyRun:
         if max(len(self.model.segments), len(self.model.density)) < 2:
             return []
         self.watch.begin("numbers of segments")
-        planned = ("optimal", "heuristic", *RANDOM_STARTS, "weighted")
+        planned = ("optimal", "heuristic", *RANDOM_STARTS, "weighted", "bracket")
         methods = [method for method in self.model.methods if method in planned]
         steps = []
         for density in self.model.density:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.files.plots import COLORS, DASHES, MARK, MARKERS, SMALL, plot_figure
+from vcam_cli.files.plots import COLORS, DASHES, MARK, MARKERS, SMALL, SMALLEST, plot_figure
 from vcam_cli.files.tables import Cell
 from vcam_cli.sweeps.sweep_result import CaseOptimum
 
