@@ -75,6 +75,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     made["gallery.md"], photographs = _gallery()
     made["reference/effects.md"], pictures = _effects()
     for path in sorted(notebooks.FOLDER.glob("*.ipynb")):
+        print(f"notebook: {path.stem}", file=sys.stderr, flush=True)
         made[f"notebooks/{path.stem}.md"], figures = notebooks.page(path)
         pictures |= {f"notebooks/{name}": data for name, data in figures.items()}
     for name, text in made.items():
@@ -297,6 +298,7 @@ def _cached(name: str, cameras: Sequence[Any], make: Callable[[Path], None]) -> 
     file = CACHE / f"{name}-{known[:16]}.png"
     if not file.exists():
         CACHE.mkdir(parents=True, exist_ok=True)
+        print(f"photograph: {name}", file=sys.stderr, flush=True)  # minutes in a first build
         make(file)
     return file.read_bytes()
 

@@ -10,6 +10,7 @@ import re
 import subprocess
 import sys
 import tarfile
+import venv
 import zipfile
 from pathlib import Path
 
@@ -149,6 +150,27 @@ def test_a_camera_runs_from_the_unpacked_wheel(installed, tmp_path):
     assert result.returncode == 0, result.stderr
     assert (tmp_path / "out" / "raw.exr").is_file()
     assert str(installed) in (tmp_path / "out" / "run.json").read_text()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kind", ["wheel", "sdist"])
+def test_it_installs_and_runs_in_a_bare_environment(kind, tmp_path):
+    """As a user installs it: dependencies from the index, nothing of the checkout on any path."""
+    package = build(kind, ROOT, tmp_path)
+    bare = tmp_path / "bare"
+    venv.create(bare, with_pip=True)
+    env = {k: v for k, v in os.environ.items() if not k.startswith("PYTHON")}
+    install = [str(bare / "bin" / "python"), "-m", "pip", "install", "-q", str(package)]
+    done = subprocess.run(install, capture_output=True, text=True, env=env, cwd=tmp_path)
+    if "Could not find a version" in done.stderr or "Connection" in done.stderr:
+        pytest.skip("no package index")
+    assert done.returncode == 0, done.stderr
+    photograph = [str(bare / "bin" / "vcam"), "run", "starter", "-o", "out", "--report"]
+    done = subprocess.run(photograph, capture_output=True, text=True, env=env, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert {"raw.exr", "render.png", "report.html"} <= {
+        p.name for p in (tmp_path / "out").iterdir()
+    }
 
 
 def test_the_container_copies_what_exists():
