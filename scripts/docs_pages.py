@@ -49,12 +49,12 @@ BOOST = {
 EXIT_CODES = {
     0: "done",
     2: "bad input or usage; the message has file, line, key and remedy",
-    3: "the machine cannot do it: memory, disk, permission, a folder in use",
+    3: "not possible on this machine: memory, disk, permission, a folder in use",
     4: "finished, and some points failed or some predictions missed their tolerance",
-    1: "a mistake in vcam; only then there is a traceback",
-    130: "interrupted; what is finished is kept, and the same command goes on",
+    1: "an error in vcam, with a traceback",
+    130: "interrupted; finished results are kept, and the same command continues",
 }
-WINDOW = "Here {columns} x {rows} of its pixels take it, with the scene fitted into them."
+WINDOW = "The photograph is a window of {columns} x {rows} pixels, with the scene scaled to it."
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
@@ -161,7 +161,7 @@ def _commands() -> Iterator[str]:
     from vcam_cli.commands.main import COMMANDS, app
 
     yield "# Commands\n"
-    yield "What `vcam COMMAND --help` prints.\n"
+    yield "The output of `vcam COMMAND --help`.\n"
     yield "## Exit codes\n\n| code | means |\n|---|---|"
     yield from (f"| {code} | {means} |" for code, means in EXIT_CODES.items())
     yield ""
@@ -206,10 +206,10 @@ def _nomenclature() -> Iterator[str]:
     yield "# Nomenclature\n"
     yield "Terms that the documentation uses, with symbol, unit, definition and standard."
     yield "`vcam explain TERM` prints an entry.\n"
-    yield "| term | symbol | unit | definition | standard or source |\n|---|---|---|---|---|"
+    yield "| term | definition | symbol | unit | standard or source |\n|---|---|---|---|---|"
     for name, term in sorted(terms().items()):
         also = f" ({', '.join(n.replace('_', ' ') for n in term.also)})" if term.also else ""
-        cells = (term.symbol, term.unit, f"{term.definition}.", term.standard)
+        cells = (f"{term.definition}.", term.symbol, term.unit, term.standard)
         said = " | ".join(escaped(cell) for cell in cells)
         yield f"| {name.replace('_', ' ')}{also} | {said} |"
     yield ""

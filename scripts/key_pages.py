@@ -155,5 +155,8 @@ def sentence(text: str) -> str:
 
 
 def escaped(text: str) -> str:
-    """Return text that Markdown shows as it is."""
-    return re.sub(r"([*_<>\[\]{}|#])", r"\\\1", text)
+    """Return text that Markdown shows as it is; code between backticks needs no escapes."""
+    parts = text.split("`")
+    for i in range(0, len(parts), 2 if len(parts) % 2 else 1):
+        parts[i] = re.sub(r"([*_<>\[\]{}|#])", r"\\\1", parts[i])
+    return "`".join(parts)
