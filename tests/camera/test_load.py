@@ -254,6 +254,18 @@ class TestSet:
         assert camera.exposure.auto.max == 1.0
         assert (camera.scene.luminance, camera.scene.radiance) == (None, 1.0)
 
+    def test_a_prescription_drops_the_lens_of_the_file_but_not_the_reverse(self, folder):
+        """A lens of a file of its own is added to any camera; a traced lens is not lost."""
+        traced = "optics.prescription={use: cooke-triplet, scale: 0.05}"
+        optics = load("camera.yaml", [traced]).optics
+        assert (optics.f_number, optics.focal_length, optics.prescription.scale) == (
+            None,
+            None,
+            0.05,
+        )
+        assert load("camera.yaml", ["optics.prescription=none"]).optics.f_number is not None
+        assert "cannot be combined" in problems(sets=[traced, "optics.f_number=8"])[0]
+
     def test_a_part(self, folder):
         Path("lens.yaml").write_text("f_number: 4\nfocal_length: 5 mm\n")
         assert load("camera.yaml", ["optics=lens"]).optics.f_number == 4

@@ -17,6 +17,7 @@ from vcam_cli.camera.derived import (
     photodiode,
 )
 from vcam_cli.camera.model import CameraModel
+from vcam_cli.camera.optics import FROM_PRESCRIPTION
 from vcam_cli.config import document, overrides, shipped
 from vcam_cli.config.file_format import FileFormat
 from vcam_cli.config.file_names import current_folder
@@ -62,6 +63,7 @@ _WORDS: dict[errors.Path, str] = {("optics",): "none"}
 _SHORTHANDS: dict[errors.Path, Key] = {("pixel", "technology"): "from"}
 MERGE_RULES = MergeRules(
     alternatives=tuple(map(Alternatives.parse, _EXCLUSIVE)),
+    determines={"prescription": FROM_PRESCRIPTION},
     variants={("scene", "source"): ("kind", "chart")},
     single_values=frozenset({"table", "off_axis"}),
     part_keys={**dict.fromkeys(_PARTS, "use"), **_SHORTHANDS},

@@ -289,6 +289,10 @@ _GROUPS = (
     ("f_number", "numerical_aperture"),
     ("aperture_diameter",),
 )
+_TRACED_SIZES = (*(name for group in _GROUPS for name in group), "exit_pupil_distance")
+_TRACED_ERRORS = ("zernike", "psf", "mtf", "distortion", "lateral_color", "focus_shift")
+FROM_PRESCRIPTION = frozenset((*_TRACED_SIZES, *_TRACED_ERRORS))
+"""Keys of a lens that follow from its prescription."""
 
 
 def _is_determined(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
@@ -312,12 +316,12 @@ def _traced_alone(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
     """Refuse beside a prescription what follows from it."""
     if not _is_traced(given):
         return
-    for name in (*(n for group in _GROUPS for n in group), "exit_pupil_distance"):
+    for name in _TRACED_SIZES:
         if given.get(name) not in (None, "auto"):
             message = "cannot be combined with prescription, which determines it"
             remedy = f"remove {name}; prescription: {{use: NAME, scale: 0.1, f_number: 4}} sets it"
             yield fault((name,), message, remedy, given[name])
-    for name in ("zernike", "psf", "mtf", "distortion", "lateral_color", "focus_shift"):
+    for name in _TRACED_ERRORS:
         if given.get(name) not in (None, "none") and not _neutral(name, given[name]):
             message = "cannot be combined with prescription, which determines it"
             yield fault((name,), message, f"remove {name}", given[name])

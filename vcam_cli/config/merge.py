@@ -32,6 +32,9 @@ class MergeRules:
     """Where an override replaces more than the keys that it gives."""
 
     alternatives: tuple[Alternatives, ...] = ()
+    determines: Mapping[Key, frozenset[Key]] = field(default_factory=dict)
+    """Key -> keys that follow from it: an override with the key drops them from the base. An
+    override with one of them drops nothing, so that both together remain an error."""
     variants: Mapping[errors.Path, tuple[Key, ...]] = field(default_factory=dict)
     """Path of a mapping -> keys that tell what it describes, the most general first. A change of
     one leaves nothing of the base but the keys before it."""
@@ -102,6 +105,9 @@ def _remaining_entries(
         given = [group for group in alternatives.groups if group & over.keys()]
         if given and alternatives.path in (None, path):
             dropped |= frozenset().union(*alternatives.groups) - frozenset().union(*given)
+    for key, following in rules.determines.items():
+        if key in over and over[key].value not in (None, "none"):
+            dropped |= following
     return {key: node for key, node in base.items() if key not in dropped}
 
 
