@@ -69,6 +69,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         "reference/words.md": "\n".join(_words()),
         "reference/nomenclature.md": "\n".join(_nomenclature()),
         "cite.md": _cite(),
+        "contributing.md": _of_repository("CONTRIBUTING.md"),
+        "changes.md": _of_repository("CHANGELOG.md"),
     }
     if "thesis.md" not in files.src_uris:
         made["thesis.md"] = "# Thesis, line by line\n\nThis page is not written yet.\n"
@@ -236,6 +238,11 @@ def _cite() -> str:
         "# How to cite\n\nPlease cite the software, and the thesis that its physics follows.\n\n"
         f"```yaml\n{text}```\n"
     )
+
+
+def _of_repository(name: str) -> str:
+    """Return a page of the repository with its links as seen from the documentation."""
+    return (ROOT / name).read_text("utf-8").replace("](docs/", "](")
 
 
 # Gallery
