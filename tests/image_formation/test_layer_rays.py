@@ -7,12 +7,19 @@ import pytest
 from every import every
 from layered_reference import FOCAL, PITCH, Flat, Scene, changes, random_scene, ray_sum, write_exr
 from making import QUIET, camera, radiance_for
+from optical_paths import PITCH as PIXEL_PITCH
+from optical_paths import aperture, path, sensor
 
 from vcam_cli import simulate
+from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.image_formation.layers import layered, ray_windows
 from vcam_cli.image_formation.layers.occlusion import RayLayer, covariance, rays
-from vcam_cli.image_formation.layers.ray_cells import Window
+from vcam_cli.image_formation.layers.ray_cells import Cells, SharpImage, Window
 from vcam_cli.image_formation.layers.ray_windows import _Sum, _too_coarse, windows_with
+from vcam_cli.image_formation.optical_path import LayerOptics
+from vcam_cli.physics import zernike
+from vcam_cli.physics.aberration import otf_ratio_symmetric
+from vcam_cli.physics.diffraction import otf_circular
 
 LARGE = {"array.rows": 150, "array.columns": 190}
 """So that there are some windows."""
@@ -82,9 +89,12 @@ def test_covariance_of_stripes_is_that_of_their_waves():
     wave = np.broadcast_to((1 + np.cos(k * np.arange(n))) / 2, (n, n))
     front = RayLayer(np.stack([np.zeros((n, n)), wave]), (r, 0.0))
     back = RayLayer(np.stack([wave, np.ones((n, n))]), (s, 0.0))
-    found = covariance(
-        [front, back], rays(4000, 0), (reach, reach), lambda light, cover: (light, cover[:, None])
-    )[0].mean()
+
+    def means(sums):
+        ((own, light, cover),) = sums
+        return light / len(own), cover[:, None] / len(own)
+
+    found = covariance([front, back], [rays(4000, 0)], (reach, reach), means)[0].mean()
     u = rays(60_000, 1)[:, 0]
     mean = [np.cos(k * radius * u).mean() for radius in (r - s, r, s)]
     assert found == pytest.approx(-(mean[0] - mean[1] * mean[2]) / 8, abs=2e-4)
@@ -131,6 +141,40 @@ def test_a_tighter_accuracy_is_never_worse(tmp_path):
         assert errors[-1] <= tolerance
     for tight, loose in zip(errors[1:], errors, strict=False):
         assert tight <= loose + 3e-4  # which the truth errs
+
+
+@pytest.mark.parametrize("period", [8, 16, 32])
+@pytest.mark.parametrize("angle", [0.0, np.pi / 2])
+def test_waves_diffract_from_rays_between_pairs_of_points(period, angle):
+    """A wave out of focus, each ray moved by its own blur, against the pupil's exact OTF.
+
+    Rays of a 32nd of the pupil diffract alike; if all of them did, the error would be up to 0.07.
+    """
+    radius, per_pixel, lens = 2e-6, 4, Diffraction(4.0, 0.0)
+    g = sensor(16, 16)
+    layer = LayerOptics((lens,), radius)
+    sharp = SharpImage(replace(path(g, lens, aperture(g)), layers=(layer,)))
+    cells = Cells(g, Window(slice(0, 16), slice(0, 16)), per_pixel, 0, (0, 0), single=False)
+    cell = PIXEL_PITCH / per_pixel
+    at = (np.arange(64) + 0.5) / period
+    x, y = (at[None, :], 0) if angle == 0 else (0, at[:, None])
+    groups = []
+    for own in sharp.groups(rays(4000, 0)):
+        moved = (own[:, 0] if angle == 0 else own[:, 1]) * radius / cell / period
+        wave = sum(np.cos(2 * np.pi * (x + y + by)) for by in moved)
+        wave = np.broadcast_to(wave, (64, 64))
+        groups.append((own, wave[None, None], wave[None]))
+    light, cover = sharp.at_pixels(cells, groups)
+    frequency = np.array(1 / (period * cell))
+    terms = zernike.defocus(2 * 4.0 * radius, 4.0)
+    otf = otf_circular(frequency, 550e-9, 4.0, 0.0)
+    otf = otf * otf_ratio_symmetric(frequency, 550e-9, 4.0, terms)
+    middles = (np.arange(16) + 0.5) * per_pixel / period
+    box = np.sinc(per_pixel / period) / np.sinc(1 / period)  # of even cells
+    expected = otf * box * np.cos(2 * np.pi * middles)
+    expected = np.broadcast_to(expected if angle == 0 else expected[:, None], (16, 16))
+    np.testing.assert_allclose(light[0, 0], expected, atol=8e-3)
+    np.testing.assert_allclose(cover[0, 0], expected, atol=8e-3)
 
 
 def mesh_before_mesh(period: float, front: float, back: float) -> Scene:

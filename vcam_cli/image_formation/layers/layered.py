@@ -36,7 +36,12 @@ from vcam_cli.image_formation.layers.layer_edges import (
 )
 from vcam_cli.image_formation.layers.occlusion import RayLayer
 from vcam_cli.image_formation.layers.ray_cells import BORDER, Cells, Window
-from vcam_cli.image_formation.layers.ray_windows import LEFT_OUT, RaySum, windows_with
+from vcam_cli.image_formation.layers.ray_windows import (
+    LEFT_OUT,
+    RaySum,
+    border_around,
+    windows_with,
+)
 from vcam_cli.image_formation.optical_path import (
     DepthReport,
     Layer,
@@ -61,6 +66,9 @@ PART = 0.5
 WIDEST = 4
 """Arrays that a layer's chart goes on beyond the array, at most. A lens at f/10000 throws light
 farther; what is cut is in the predicted error: what half of that margin changes."""
+
+LONGEST_END = 1.0
+"""Where a layer ends that fills the frame [m]: no lens throws light so far."""
 
 
 @dataclass(frozen=True)
@@ -129,12 +137,15 @@ def layered_image(
     full = min(float(light.max(initial=0.0)), path.ceiling)
     allowed = math.sqrt(max((tolerance * full) ** 2 - own**2, (RAYS_SHARE * tolerance * full) ** 2))
     windows, left_out = windows_with(bound, LEFT_OUT * allowed)
+    border, beyond = border_around(path, _end(g, scene), rms(bound), allowed)
     if any(map(moves_otherwise, path.layers)):  # at rest they would hide other light of each other
         windows, left_out = [], float(np.sqrt(np.square(bound, dtype=float).mean()))
     far = [max(lengths) for lengths in zip(*map(ray_reach, path.layers), strict=True)]
-    rays = RaySum(path, (far[0], far[1]), partial(_painted, path, scene))
-    hidden = rays.add(light, windows, math.sqrt(max(allowed**2 - left_out**2, 0.0)))
-    error = math.hypot(own, hidden.error, left_out)
+    rays = RaySum(path, (far[0], far[1]), partial(_painted, path, scene), border)
+    left = math.hypot(left_out, beyond if windows else 0.0)
+    # No number of rays makes up for light from beyond a border that could not be wide enough.
+    hidden = rays.add(light, windows, math.sqrt(max(allowed**2 - left**2, (allowed / 2) ** 2)))
+    error = math.hypot(own, hidden.error, left)
     full = min(float(light.max(initial=0.0)), path.ceiling)
     over_full = 1 / full if full else 0.0
     depth = DepthReport(
@@ -190,6 +201,18 @@ def _composed(
             bound[here[1:]] += most * np.minimum(part, clear[here].max(axis=0))
             clear[here] *= 1 - layer.cover
     return total, bound
+
+
+def _end(g: Geometry, scene: LayeredScene) -> float:
+    """Return how far beyond the array layers that hide others end at most [m]."""
+    ends = [0.0]
+    for part in scene.parts[:-1]:
+        if part.size is None:
+            return LONGEST_END
+        (x, y), size = part.chart.center, part.size
+        ends.append(abs(x) + (size.width - g.sensor_width) / 2)
+        ends.append(abs(y) + (size.height - g.sensor_height) / 2)
+    return max(ends)
 
 
 def _painted(path: OpticalPath, scene: LayeredScene, cells: Cells) -> list[RayLayer]:

@@ -15,9 +15,9 @@ Layers are known by their means over cells. Of such layers each ray has the exac
 the cells that it meets. Its errors are those of the size of the cells and of the number of
 rays, which `ray_windows.py` chooses.
 
-Diffraction acts on the composed image as that of the lens in focus. A point of the pupil represents
-pairs of points on both sides of it [1]_, which are the closer together the nearer it lies to the
-pupil's edge; that is neglected in C, where it is little beside blurs wider than diffraction.
+A wave that diffracts comes from pairs of points of the pupil, as if both saw what their middle sees
+[1]_: K < > at a frequency is a mean over the rays through middles of pairs that lie so far apart
+(`ray_cells.SharpImage`). For one layer at any defocus that is exact.
 
 References
 ----------
@@ -28,7 +28,7 @@ References
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,9 +46,11 @@ STEPS = (
 
 Planes = tuple[Array, Array]
 """Light times opacity (C, h, w), and opacity (h, w) or (C, h, w)."""
-Seen = Callable[[Array, Array], tuple[Array, Array]]
-"""What makes of images of light (n, C, h, w) and of opacity (m, h, w) their values in every color
-at the pixels: (n, C, rows, columns) and (m, C, rows, columns)."""
+Sums = tuple[Array, Array, Array]
+"""Rays (k, 5), and the sums over them of images of light (n, C, h, w) and of opacity (m, h, w)."""
+Seen = Callable[[Iterable[Sums]], tuple[Array, Array]]
+"""What makes of groups of rays the means over all of them in every color at the pixels:
+(n, C, rows, columns) and (m, C, rows, columns)."""
 Compose = Callable[[Sequence[Planes]], Array]
 """What makes light (C, h, w) of layers, the nearest first."""
 
@@ -154,7 +156,7 @@ def front_to_back(layers: Sequence[Planes]) -> Array:
 
 def covariance(
     layers: Sequence[RayLayer],
-    rays: Array,
+    groups: Sequence[Array],
     reach: tuple[int, int],
     seen: Seen,
     compose: Compose = front_to_back,
@@ -165,8 +167,8 @@ def covariance(
     ----------
     layers : sequence of RayLayer
         Layers on cells of one shape, the nearest first.
-    rays : Array
-        Rays (n, 5).
+    groups : sequence of Array
+        Rays (k, 5), in groups whose light is kept apart.
     reach : tuple of int
         Rows and columns of cells at each border that only rays from elsewhere meet.
     seen : callable
@@ -182,21 +184,25 @@ def covariance(
     colors, *shape = layers[0].planes.shape
     colors -= 1
     rows, columns = (n - 2 * around for n, around in zip(shape, reach, strict=True))
-    offsets = [layer.offsets(rays) for layer in layers]
     dtype = layers[0].planes.dtype
-    light = np.zeros((len(layers) + 1, colors, rows, columns), dtype)  # of all together, and each
-    cover = np.zeros((len(layers) - 1, rows, columns), dtype)
-    for number in range(len(rays)):
-        met = []
-        for layer, own in zip(layers, offsets, strict=True):
-            top, left = reach[0] + own[number, 1], reach[1] + own[number, 0]
-            part = layer.planes[:, top : top + rows, left : left + columns]
-            met.append((part[:-1], part[-1]))
-        light[0] += compose(met)
-        for sums, (own_light, _) in zip(light[1:], met, strict=True):
-            sums += own_light
-        for sums, (_, opacity) in zip(cover, met[:-1], strict=True):
-            sums += opacity
-    (together, *alone), covers = seen(light / len(rays), cover / len(rays))
+
+    def summed(rays: Array) -> Sums:
+        offsets = [layer.offsets(rays) for layer in layers]
+        light = np.zeros((len(layers) + 1, colors, rows, columns), dtype)  # of all, and of each
+        cover = np.zeros((len(layers) - 1, rows, columns), dtype)
+        for number in range(len(rays)):
+            met = []
+            for layer, own in zip(layers, offsets, strict=True):
+                top, left = reach[0] + own[number, 1], reach[1] + own[number, 0]
+                part = layer.planes[:, top : top + rows, left : left + columns]
+                met.append((part[:-1], part[-1]))
+            light[0] += compose(met)
+            for sums, (own_light, _) in zip(light[1:], met, strict=True):
+                sums += own_light
+            for sums, (_, opacity) in zip(cover, met[:-1], strict=True):
+                sums += opacity
+        return rays, light, cover
+
+    (together, *alone), covers = seen(map(summed, groups))
     means = list(zip(alone, [*covers, np.ones_like(together)], strict=True))
     return np.asarray(together - compose(means))

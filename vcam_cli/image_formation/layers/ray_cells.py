@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.blurs import Blur, SeparableTransfer
 from vcam_cli.effects.optics.diffraction import Diffraction
+from vcam_cli.image_formation.layers.occlusion import Sums
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.transfer_functions import Transfer
 
@@ -22,6 +23,11 @@ TINY = 1e-9
 """Width of a photodetector that is a point [cells]."""
 ENTRIES = 1024
 """Frequencies at which a round transfer function is tabulated."""
+POINTS = 4
+"""Rays of a group for which what diffraction passes is computed, about."""
+RINGS, SECTORS = 4, 8
+"""Rings of equal area and sectors of the pupil, opposite ones together: groups of rays that
+diffraction treats alike."""
 
 
 @dataclass(frozen=True)
@@ -145,6 +151,7 @@ class SharpImage:
 
     def __init__(self, path: OpticalPath) -> None:
         lens = of_kind(path.layers[0].effects, Diffraction) if path.layers else ()
+        self._lens = lens[0] if lens else None
         behind = tuple(e for e in path.effects if e.origin != "lens")
         separable = of_kind(behind, SeparableTransfer)
         self._apertures = tuple(e.box for e in separable if e.box is not None)
@@ -154,44 +161,107 @@ class SharpImage:
         self._transfer = Transfer(path.transfer.wavelengths, white, blurs)
         self._known: dict[tuple[int, tuple[int, int]], Array] = {}
 
-        self.inner_part = 1.0
-        """Radius of the disc that is as large as all middles of pairs of points of the pupil from
-        which waves of half the pixels' Nyquist frequency come [radii of the pupil]."""
-        if lens:
-            g = path.geometry
-            middle = np.array([0.25 / max(g.pitch_x, g.pitch_y)])
-            passed = np.mean([lens[0].otf(middle, w) for w in path.transfer.wavelengths])
-            self.inner_part = math.sqrt(float(passed))
+    def groups(self, rays: Array) -> list[Array]:
+        """Return rays in groups, in each of which about the same waves diffract.
+
+        Parameters
+        ----------
+        rays : Array
+            Rays (n, 5).
+
+        Returns
+        -------
+        list of Array
+            Groups (k, 5); one of all without diffraction.
+        """
+        if self._lens is None:
+            return [rays]
+        x, y = rays[:, 0], rays[:, 1]
+        ring = (RINGS * (x**2 + y**2)).astype(int)
+        sector = (SECTORS * (np.arctan2(y, x) / np.pi % 1)).astype(int) % SECTORS
+        number = ring * SECTORS + sector
+        return [rays[number == own] for own in np.unique(number)]
 
     @property
     def is_local(self) -> bool:
         """Whether pixels see their own area alone."""
         return not (self._transfer.effects or self._separable)
 
-    def at_pixels(self, cells: Cells, light: Array, cover: Array) -> tuple[Array, Array]:
-        """Return the values of images on the inner cells in every color at the pixels.
+    def at_pixels(self, cells: Cells, groups: Iterable[Sums]) -> tuple[Array, Array]:
+        """Return the means over rays in every color at the pixels.
 
         Parameters
         ----------
         cells : Cells
             Cells of a window.
-        light, cover : Array
-            Images of light (n, C, h, w) and of opacity (m, h, w).
+        groups : iterable of Sums
+            Groups of rays, and sums over them of images on the inner cells: of light (n, C, h, w)
+            and of opacity (m, h, w).
 
         Returns
         -------
         light, cover : Array
             Values (n, C, rows, columns) and (m, C, rows, columns) at the pixels.
         """
-        cover, shape = cover[:, None], light.shape[-2:]
-        if not self.is_local:
-            transfer = self._on(cells, shape)
-            light, cover = (
-                scipy.fft.irfft2(scipy.fft.rfft2(image) * transfer, shape)
-                for image in (light, cover)
-            )
-        light, cover = (self._collected(cells, image) for image in (light, cover))
+        found = self._means if self._lens is None else self._waves
+        light, cover = (self._collected(cells, image) for image in found(cells, groups))
         return light, np.broadcast_to(cover, (len(cover), *light.shape[1:]))
+
+    def _means(self, cells: Cells, groups: Iterable[Sums]) -> tuple[Array, Array]:
+        """Return images (n, C, h, w) and (m, C or 1, h, w) where every ray counts alike."""
+        (rays, light, cover), *none = groups
+        assert not none
+        light, cover = light / len(rays), cover[:, None] / len(rays)
+        if self.is_local:
+            return light, cover
+        shape = light.shape[-2:]
+        transfer = self._on(cells, shape)
+        light, cover = (
+            scipy.fft.irfft2(scipy.fft.rfft2(image) * transfer, shape) for image in (light, cover)
+        )
+        return light, cover
+
+    def _waves(self, cells: Cells, groups: Iterable[Sums]) -> tuple[Array, Array]:
+        """Return the same behind a lens that diffracts: at each frequency of the rays it passes."""
+        light: Array | float = 0.0
+        cover: Array | float = 0.0
+        passed: Array | float = 0.0
+        shape = (0, 0)
+        for rays, own_light, own_cover in groups:
+            shape = own_light.shape[-2:]
+            share = self._passed(cells, shape, rays)
+            passed = passed + len(rays) * share
+            light = light + scipy.fft.rfft2(own_light) * share
+            cover = cover + scipy.fft.rfft2(own_cover[:, None]) * share
+        transfer = self._on(cells, shape)
+        # How many pairs of points there are is that of the lens's own transfer, exactly.
+        transfer = np.divide(
+            transfer, passed, out=np.zeros_like(transfer), where=np.asarray(passed) > 0
+        )
+        return scipy.fft.irfft2(light * transfer, shape), scipy.fft.irfft2(cover * transfer, shape)
+
+    def _passed(self, cells: Cells, shape: tuple[int, int], rays: Array) -> Array:
+        """Return the part (C, h, w) of the light that pairs of points around rays diffract.
+
+        Two points of the pupil, 2 s apart in its radii and with the middle u, are both on it where
+        s^2 + 2 |u s| <= 1 - u^2; waves of the frequency f come from s = wavelength N f.
+        """
+        assert self._lens is not None
+        fx, fy = self._frequencies(cells, shape)
+        wavelengths, (weights,) = self._transfer.wavelengths, self._transfer.weights
+        number = 1 / (self._lens.cutoff(1.0))  # N, of the light that has a wavelength of 1
+        squares = np.square(number * fx)[None, :] + np.square(number * fy)[:, None]
+        below = np.concatenate([np.zeros((len(weights), 1)), np.cumsum(weights, axis=1)], axis=1)
+        below /= np.where(below[:, -1:] > 0, below[:, -1:], 1)
+        total: Array | float = 0.0
+        for x, y in _spread(rays[:, :2]):
+            along = np.abs(x * number * fx[None, :] + y * number * fy[:, None])
+            room = 1 - x**2 - y**2
+            # The longest wavelength for which there are such pairs.
+            longest = room / (along + np.sqrt(np.square(along) + room * squares) + TINY)
+            total = total + below[:, np.searchsorted(wavelengths, longest, side="right")]
+        kind = np.float32 if cells.single else np.float64
+        return np.asarray(total / len(_spread(rays[:, :2])), kind)
 
     def _collected(self, cells: Cells, image: Array) -> Array:
         """Return the means over the collecting areas of an image, exactly on its even cells."""
@@ -216,8 +286,8 @@ class SharpImage:
         key = cells.per_pixel, shape
         if key in self._known:
             return self._known[key]
-        (side_x, side_y), blur = cells.sides, self._transfer
-        fx, fy = scipy.fft.rfftfreq(shape[1]) / side_x, scipy.fft.fftfreq(shape[0]) / side_y
+        blur = self._transfer
+        fx, fy = self._frequencies(cells, shape)
         found: Array = np.ones((1, len(fy), len(fx)))
         if blur.effects:
             level = blur.level[0][:, None, None]
@@ -228,6 +298,11 @@ class SharpImage:
         self._known[key] = found.astype(kind if np.iscomplexobj(found) else kind(0).real.dtype)
         return self._known[key]
 
+    def _frequencies(self, cells: Cells, shape: tuple[int, int]) -> tuple[Array, Array]:
+        """Return the frequencies along x and y of transforms of images [cycles/m]."""
+        side_x, side_y = cells.sides
+        return scipy.fft.rfftfreq(shape[1]) / side_x, scipy.fft.fftfreq(shape[0]) / side_y
+
     def _blur(self, fx: Array, fy: Array) -> Array:
         """Return the response (C, m, n) of lens and silicon at pairs of frequencies [e/s]."""
         if self._transfer.plane_blurs:
@@ -236,3 +311,8 @@ class SharpImage:
         table = np.linspace(0, np.hypot(fx.max(), np.abs(fy).max()), ENTRIES)
         radial, length = self._transfer.radial_response(table)[0], np.hypot(fx[None], fy[:, None])
         return np.stack([np.interp(length, table, one) for one in radial])
+
+
+def _spread(points: Array) -> Array:
+    """Return a few points of a group: with more their mean share hardly changes."""
+    return points[:: -(-len(points) // POINTS)]

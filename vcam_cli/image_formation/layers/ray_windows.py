@@ -12,11 +12,6 @@ In all others the covariance is summed over rays (`occlusion.py`), by two sets t
 radii nor angles nor cells. The finer of the two is taken, and their difference is its error. Where
 that is too much a still finer set of the other kind follows, window by window, until all errors
 together are within what is allowed.
-
-Waves of the image that a lens diffracts come from pairs of points of its pupil, whose middles lie
-the closer to its center the finer the wave is; rays have all of it. What the sum changes if rays
-are kept to the part that waves of half the pixels' Nyquist frequency come from is added to the
-error: no finer sum takes it out.
 """
 
 from __future__ import annotations
@@ -29,6 +24,9 @@ from functools import partial
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.effects.base import of_kind
+from vcam_cli.effects.optics.diffraction import Diffraction
+from vcam_cli.image_formation.estimates.bandwidth import line_spread_tail
 from vcam_cli.image_formation.layers.occlusion import (
     Compose,
     RayLayer,
@@ -59,6 +57,10 @@ GROWTH = 4
 """Values that a level takes over those of all before it, about."""
 LEFT_OUT = 0.3
 """Part of what is allowed that windows left out may have, by their bound."""
+BEYOND = 0.3
+"""Part of what is allowed that light which diffracts from beyond a window's border may have."""
+WIDEST_BORDER = 12
+"""Pixels of such a border, at most: the predicted error includes what a narrower one leaves."""
 
 
 Paint = Callable[[Cells], Sequence[RayLayer]]
@@ -93,8 +95,6 @@ class _Sum:
     error: float = 0.0
     """Sum of the squares of its difference from the sum before [(e/s)^2]."""
     values: int = 0
-    diffracted: float = 0.0
-    """The same of what diffraction changes of it, which no finer sum takes out [(e/s)^2]."""
 
 
 @dataclass(frozen=True)
@@ -105,6 +105,8 @@ class RaySum:
     furthest: tuple[float, float]
     """How far a ray meets a layer from where it reaches the sensor, along x and y [m]."""
     paint: Paint
+    border: int = BORDER
+    """Pixels around a window from which light diffracts into it."""
     compose: Compose = front_to_back
     sharp: SharpImage = field(init=False)
 
@@ -141,7 +143,7 @@ class RaySum:
         if not used:
             return Hidden()
         finest = max(one.level for one in used)
-        squares = sum(one.error + one.diffracted for one in sums)
+        squares = sum(one.error for one in sums)
         error = math.sqrt(squares / (g.rows * g.columns))
         return Hidden(*LEVELS[finest], error, 0.0, sum(one.values for one in sums))
 
@@ -155,9 +157,6 @@ class RaySum:
         halves = LEVELS[1][0] // LEVELS[0][0]
         on, seen = cells.together(halves), [own.together(halves) for own in layers]
         coarse = self._summed(0, on, seen)
-        if self.sharp.inner_part < 1:
-            narrow = self._summed(0, on, seen, self.sharp.inner_part)
-            coarse = replace(coarse, diffracted=_squares(coarse, narrow))
         return self._compared(self._summed(1, cells, layers), coarse)
 
     def _refined(self, coarse: _Sum) -> _Sum:
@@ -169,13 +168,12 @@ class RaySum:
         return replace(
             fine,
             error=_squares(fine, coarse),
-            diffracted=coarse.diffracted,
             values=fine.values + coarse.values,
         )
 
     def _cells(self, window: Window, level: int) -> Cells:
         per_pixel, g = LEVELS[level][0], self.path.geometry
-        border = 0 if self.sharp.is_local else BORDER * per_pixel
+        border = 0 if self.sharp.is_local else self.border * per_pixel
         down, right = (
             2 * math.ceil((far / pitch * per_pixel + 2) / 2 + 1)
             for far, pitch in zip(self.furthest[::-1], (g.pitch_y, g.pitch_x), strict=True)
@@ -183,14 +181,12 @@ class RaySum:
         single = self.path.settings.dtype == np.float32
         return Cells(g, window, per_pixel, border, (down, right), single)
 
-    def _summed(
-        self, level: int, cells: Cells, layers: Sequence[RayLayer], part: float = 1.0
-    ) -> _Sum:
-        """Return the sum of a level over the inner part of the aperture, in its radii."""
+    def _summed(self, level: int, cells: Cells, layers: Sequence[RayLayer]) -> _Sum:
+        """Return the sum of a level."""
         count, dtype = LEVELS[level][1], self.path.settings.dtype
+        groups = self.sharp.groups(rays(count, level % 2))
         seen = partial(self.sharp.at_pixels, cells)
-        traced = rays(count, level % 2) * (part, part, 1, 1, 1)
-        light = covariance(layers, traced, cells.reach, seen, self.compose)
+        light = covariance(layers, groups, cells.reach, seen, self.compose)
         values = count * len(layers) * len(layers[0].planes) * math.prod(cells.inner)
         return _Sum(cells.window, level, light.astype(dtype), values=values)
 
@@ -215,6 +211,44 @@ def _too_coarse(sums: Sequence[_Sum], budget: float) -> list[_Sum]:
         if left < 0 and one.level + 1 < len(LEVELS) and GROWTH * one.values <= MOST_VALUES:
             found.append(one)
     return found
+
+
+def border_around(
+    path: OpticalPath, end: float, hidden: float, allowed: float
+) -> tuple[int, float]:
+    """Return how wide a border around windows is, and what diffracts from beyond it.
+
+    The light of a line that diffracts farther than x falls on both its sides, along x and along y.
+    What layers hide beyond a window is taken to be as much as on the array, up to where they end.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings, with the optics of each layer.
+    end : float
+        How far beyond the array layers that hide others end [m].
+    hidden : float
+        Bound on what layers hide from some rays alone, rms over the array [e/s].
+    allowed : float
+        Error to be reached, rms over the array [e/s].
+
+    Returns
+    -------
+    border : int
+        Border [pixels].
+    error : float
+        Rms of the light from beyond [e/s]; 0 without diffraction.
+    """
+    lens = of_kind(path.layers[0].effects, Diffraction)
+    if not lens:
+        return BORDER, 0.0
+    pixels = np.arange(BORDER, WIDEST_BORDER + 1)
+    distance = pixels * min(path.geometry.pitch_x, path.geometry.pitch_y)
+    distance = np.append(distance, max(end, distance[-1]))
+    tail = line_spread_tail(lens, float(path.transfer.wavelengths[-1]), distance)
+    errors = 2 * math.sqrt(2) * hidden * (tail[:-1] - tail[-1])
+    number = min(int((errors > BEYOND * allowed).sum()), len(pixels) - 1)
+    return int(pixels[number]), float(errors[number])
 
 
 def windows_with(bound: Array, allowed: float) -> tuple[list[Window], float]:
