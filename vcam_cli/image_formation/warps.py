@@ -55,8 +55,6 @@ from vcam_cli.scenes.waves import WaveScene
 
 GROUPS_SHARE = 0.15
 """Part of the tolerance that light between the wavelengths of the groups may err."""
-MOST_GROUPS = 24
-"""Wavelengths at which a chart is warped, at most: each takes an image of its own."""
 CELLS_SHARE = 0.4
 """Part of the tolerance by which the skew of what cells see may be missed, in full contrast."""
 DETAIL = 0.2
@@ -456,7 +454,7 @@ def _groups(path: OpticalPath, seen: _SeenScene, warps: Warps) -> list[tuple[flo
     Between two of them light is straight in the way that the corner goes from one to the other. An
     image that is displaced by u d, 0 <= u <= 1, errs there by u (1 - u) / 2 (2 pi f d)^2 of a wave
     at most, and by 1 whatever it is: summed up over the edges of the scene, as lens and pixels
-    blur them.
+    blur them. Where that takes as many images as there are wavelengths, each has its own.
     """
     wavelengths, g = path.transfer.wavelengths, path.geometry
     corner = np.array([g.sensor_width / 2]), np.array([g.sensor_height / 2])
@@ -466,9 +464,11 @@ def _groups(path: OpticalPath, seen: _SeenScene, warps: Warps) -> list[tuple[flo
         return [(float(wavelengths[0]), np.ones(len(wavelengths)))]
     error = GroupError.of_chart(path, seen.chart)
     allowed = GROUPS_SHARE * path.settings.tolerance * path.full
-    most = min(MOST_GROUPS, len(wavelengths))
-    counts = (n for n in range(2, most) if error.rms(way[-1] / (n - 1)) <= allowed)
-    knots = np.linspace(0, way[-1], next(counts, most))
+    counts = (n for n in range(2, len(way)) if error.rms(way[-1] / (n - 1)) <= allowed)
+    count = next(counts, None)
+    if count is None:
+        return list(zip(wavelengths.tolist(), np.eye(len(way)), strict=True))
+    knots = np.linspace(0, way[-1], count)
     centers = np.interp(knots, way, wavelengths)
     shares = [np.interp(way, knots, hat) for hat in np.eye(len(knots))]
     return list(zip(centers.tolist(), shares, strict=True))
