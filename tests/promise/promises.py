@@ -186,6 +186,15 @@ pixel: {architecture: aps-4t, readout: {column_noise: 3 e, row_noise: 2 e}}
 array: {rows: 60, columns: 80, pattern: bayer-rggb}
 exposure: {auto: {max: 100 ms}}
 """,
+    "a hexagonal aperture": """
+scene: {source: {kind: chart, chart: slanted-edge}}
+optics:
+  f_number: 2.8
+  defocus: 30 um
+  aperture: {blades: 6, rotation: 10 deg, obscuration: 30 %, spiders: {count: 4, width: 2 %}}
+array: {rows: 60, columns: 80}
+exposure: {auto: {max: 100 ms}}
+""",
     "coma": """
 scene: {source: {kind: chart, chart: slanted-edge}}
 optics:

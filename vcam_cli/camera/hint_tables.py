@@ -54,6 +54,10 @@ KEYS: Mapping[str, str] = {
         ("olpf", "optical_low_pass", "low_pass_filter", "anti_aliasing", "anti_aliasing_filter"),
         "optics.low_pass: {displacement: 2.3 um}",
     ),
+    **dict.fromkeys(
+        ("iris", "iris_blades", "aperture_blades", "central_obscuration", "spider", "bokeh"),
+        "optics.aperture: {blades: 6}",
+    ),
     "cos4": "optics.off_axis: cos4",
     **dict.fromkeys(
         ("radial_distortion", "k1", "k2", "k3", "p1", "p2", "dist_coeffs"),

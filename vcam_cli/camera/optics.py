@@ -1,8 +1,9 @@
 """The lens."""
 
 import math
+import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -15,7 +16,7 @@ from vcam_cli.camera.lens_distortion import DISTORTION, AnyDistortion, one_proje
 from vcam_cli.camera.spectrum import Spectral, SpectrumSpec, flat
 from vcam_cli.config.lists import read_items, repeats
 from vcam_cli.config.model import Model, Rule, at_most_one, exactly_one, key
-from vcam_cli.config.quantities import Number, Percentage, Quantity
+from vcam_cli.config.quantities import Number, Percentage, Quantity, Whole
 from vcam_cli.config.validation_messages import describe, failure, fault
 from vcam_cli.config.values import (
     Either,
@@ -31,6 +32,7 @@ from vcam_cli.config.values import (
     word_or,
 )
 from vcam_cli.config.yaml_type import YamlType, to_yaml
+from vcam_cli.physics.opening import CIRCLE, Opening
 
 LEAST_F_NUMBER, MOST_F_NUMBER = 0.5, 1e4
 """A sharp image in air has no less than f/0.5, where the cone of light is a half space (Abbe's sine
@@ -200,6 +202,64 @@ class LowPassFilter(Model):
     )
 
 
+class Spiders(Model):
+    """Vanes that hold a central obscuration."""
+
+    count: Annotated[int, Whole(least=1, most=12)] = key(
+        "vanes from the center outwards, evenly spread; the first points along rotation", example=4
+    )
+    width: Annotated[float, Percentage(above=0, most=0.2, example="2 %")] = key(
+        "width of each, of the aperture's diameter", unit="%", example="2 %"
+    )
+
+
+class ApertureShape(Model):
+    """The shape of the lens's aperture, inside the circle that the f-number counts."""
+
+    blades: Annotated[int | None, Whole(least=3, most=32)] = key(
+        "sides of a regular polygon with its corners on the circle; default a circle",
+        example=6,
+        default=None,
+    )
+    rotation: Annotated[float, Quantity("angle")] = key(
+        "direction of a corner and of a spider, clockwise from the right",
+        unit="deg",
+        example="10 deg",
+        default=0.0,
+    )
+    obscuration: Annotated[float, Percentage(least=0, most=0.9, example="30 %")] = key(
+        "diameter of a central obscuration, of the aperture's", unit="%", default=0.0
+    )
+    spiders: Annotated[Spiders | None, word_or(Spiders, {"none": None})] = key(
+        "vanes across the aperture", example={"count": 4, "width": "2 %"}, default=None
+    )
+
+    @property
+    def opening(self) -> Opening:
+        """The shape in radii of the circle."""
+        vanes = self.spiders
+        found = Opening(
+            self.blades or 0,
+            self.rotation,
+            self.obscuration,
+            vanes.count if vanes else 0,
+            vanes.width if vanes else 0.0,
+        )
+        return replace(found, rotation=0.0) if not (found.blades or found.spiders) else found
+
+
+def _aperture(given: Any) -> ApertureShape | None:
+    if given is None or given == "circle":
+        return None
+    if isinstance(given, (Mapping, ApertureShape)):
+        return ApertureShape.model_validate(given)
+    size = re.fullmatch(r"(?:[fF]/?)?([0-9.]+)", str(given).strip())
+    raise ValueError(
+        f"{describe(given)} is no shape; write optics.f_number: {size[1] if size else 2.8} for its"
+        " size, circle or {blades: 6} for its shape"
+    )
+
+
 Terms = tuple[tuple[int, float], ...]
 """((Noll index, coefficient [m]), ...)"""
 _COEFFICIENT = Quantity("length")
@@ -335,6 +395,26 @@ def _measured_alone(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
             message = f"cannot be given beside {measured[0]}, which includes all aberrations"
             remedy = f"remove {name}, or write {measured[0]}: none"
             yield fault((name,), message, remedy, given[name])
+
+
+def _shaped_alone(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
+    """Refuse beside a shaped aperture what is not simulated through one."""
+    if given.get("aperture") in (None, "circle"):
+        return
+    for name in ("prescription", "psf", "mtf"):
+        if given.get(name) not in (None, "none"):
+            message = f"cannot be combined with {name}, which has the lens's own pupil in it"
+            yield fault(("aperture",), message, f"remove aperture, or {name}", given["aperture"])
+    wavefront = given.get("zernike")
+    if isinstance(wavefront, (list, tuple)) or (
+        isinstance(wavefront, Wavefront) and any(place is not None for place, _ in wavefront.terms)
+    ):
+        message = "is simulated with a wavefront that is the same all over the field"
+        remedy = "write zernike: {4: 0.05 um}, without a field, or remove aperture"
+        yield fault(("aperture",), message, remedy, given["aperture"])
+    if given.get("diffraction") is False:
+        message = "is simulated with diffraction"
+        yield fault(("aperture",), message, "remove diffraction: false", given["aperture"])
 
 
 def _neutral(name: str, given: Any) -> bool:
@@ -533,6 +613,16 @@ class Optics(Model):
         example="double-gauss",
         default=None,
     )
+    aperture: Annotated[
+        ApertureShape | None,
+        Either(_aperture, Literal["circle"] | ApertureShape, words={"circle": None}),
+    ] = key(
+        "shape of the aperture: circle, or {blades: 6, rotation: 10 deg, obscuration: 30 %, "
+        "spiders: {count: 4, width: 2 %}}, in diffraction and in the blur of defocus; f_number "
+        "counts the circle around it, of whose light it passes its share of the area",
+        example={"blades": 6},
+        default=None,
+    )
     low_pass: Annotated[LowPassFilter | None, word_or(LowPassFilter, {"none": None})] = key(
         "optical low-pass filter on the sensor, against aliasing: displaced copies of the image",
         example={"displacement": "2.3 um"},
@@ -545,7 +635,13 @@ class Optics(Model):
         _measured_alone,
         _traced_alone,
         one_projection,
+        _shaped_alone,
     )
+
+    @property
+    def opening(self) -> Opening:
+        """Shape of the aperture."""
+        return CIRCLE if self.aperture is None else self.aperture.opening
 
     @property
     def is_lens(self) -> bool:
@@ -560,4 +656,4 @@ class Optics(Model):
     @property
     def replaces_diffraction(self) -> bool:
         """Whether diffraction is in the lens's blur, and no factor of its own."""
-        return self.measured_blur or self.prescription is not None
+        return self.measured_blur or self.prescription is not None or self.opening != CIRCLE

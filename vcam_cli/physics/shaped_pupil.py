@@ -150,6 +150,11 @@ class OtfGrid:
     farthest: float
     """Lag along each axis up to which it is known; from 2 on there is nothing."""
 
+    @property
+    def nbytes(self) -> int:
+        """Memory that the coefficients take [bytes]."""
+        return self.spline.nbytes
+
     def interpolate(self, sx: Array, sy: Array) -> Array:
         """Return the OTF at any lags [half frames], which broadcast; 1 at 0."""
         from scipy.ndimage import map_coordinates
@@ -193,12 +198,36 @@ def otf_grid(pupil: Mask, waves: Array, order: int, farthest: float = 2.0) -> Ot
     OtfGrid
         The OTF over lags in half frames.
     """
+    vander = np.polynomial.legendre.legvander(places(pupil), order)
+    return grid_of_paths(pupil, vander @ tensor(waves, order).T @ vander.T, farthest)
+
+
+def places(pupil: Mask) -> Array:
+    """Return the places (n,) of a pupil's samples along either axis [half frames]."""
+    return _places(pupil.samples - 2)
+
+
+def grid_of_paths(pupil: Mask, turns: Array, farthest: float = 2.0) -> OtfGrid:
+    """Return the OTF of a pupil with a wavefront that is known at its samples.
+
+    Parameters
+    ----------
+    pupil : Mask
+        Its shape.
+    turns : ndarray
+        Wavefront (n, n) over y and x [wavelengths].
+    farthest : float
+        Lag along each axis up to which the OTF is wanted [half frames].
+
+    Returns
+    -------
+    OtfGrid
+        The OTF over lags in half frames.
+    """
     from scipy import fft
     from scipy.ndimage import spline_filter
 
     samples = pupil.samples
-    vander = np.polynomial.legendre.legvander(_places(samples - 2), order)
-    turns = (vander @ tensor(waves, order).T @ vander.T).astype(np.float64)
     phase = (2 * np.pi * (turns - np.rint(turns))).astype(np.float32)
     field = np.empty(phase.shape, np.complex64)
     np.cos(phase, out=field.real)

@@ -75,6 +75,8 @@ class Geometry:
     """Diameter of the exit pupil over that of the entrance pupil, P."""
     traced_area: float | None = None
     """Area of a traced lens's pupil on the axis, in direction cosines [sr]."""
+    opening_share: float = 1.0
+    """Area of the aperture over that of the circle that the f-number counts."""
 
     @property
     def image_distance(self) -> float:
@@ -121,13 +123,15 @@ class Geometry:
     def irradiance_per_radiance(self) -> float:
         """Irradiance on the axis over the scene's radiance, eq 2.18 [sr].
 
-        Without a lens the sensor lies in the place of the scene's diffuser: pi.
+        Without a lens the sensor lies in the place of the scene's diffuser: pi. An aperture that is
+        no circle passes as much less as its area is smaller.
         """
         if not self.has_lens:
             return math.pi
         if self.traced_area is not None:
             return self.traced_area
-        return float(radiometry.irradiance_per_radiance(self.f_number, self.cone_magnification))
+        whole = radiometry.irradiance_per_radiance(self.f_number, self.cone_magnification)
+        return float(whole) * self.opening_share
 
     @property
     def detector_area(self) -> float:
@@ -270,6 +274,7 @@ def geometry(camera: CameraModel) -> Geometry:
         scene_width_on_sensor=_scene_width(camera, optics.scale_at(scene_distance(camera))),
         pupil_magnification=optics.pupil_magnification,
         traced_area=_traced_area(camera),
+        opening_share=camera.optics.opening.share,
     )
 
 

@@ -10,6 +10,7 @@ less. Which kind of blur a camera has depends on its file:
 
     point_spread.py     a point spread function, measured or from a lens program
     traced_blur.py      wavefronts of a lens that is given by its prescription
+    shaped_blur.py      a wavefront in an opening that is no circle
     measured_mtf.py     a measured modulation transfer, the same everywhere or over the field
     field_blur.py       a wavefront that changes over the field, or turns with the azimuth
     wavefront_blur.py   a wavefront that is the same everywhere, symmetric about the axis or not
@@ -22,6 +23,7 @@ from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.optics.field_blur import FieldBlur
 from vcam_cli.effects.optics.measured_mtf import FieldMtf, MeasuredMtf
 from vcam_cli.effects.optics.point_spread import PointSpread
+from vcam_cli.effects.optics.shaped_blur import ShapedBlur
 from vcam_cli.effects.optics.traced_blur import TracedBlur
 from vcam_cli.effects.optics.wavefront_blur import (
     AberrationBlur,
@@ -35,8 +37,9 @@ from vcam_cli.errors import bad
 from vcam_cli.physics import aberration, zernike
 
 KINDS = (
-    TracedBlur, PointSpread, MeasuredMtf, FieldMtf, SymmetricBlur, DirectedBlur, FieldBlur
-)  # fmt: skip
+    *(TracedBlur, ShapedBlur, PointSpread, MeasuredMtf, FieldMtf),
+    *(SymmetricBlur, DirectedBlur, FieldBlur),
+)
 """Kinds of blur; a camera has at most one of them."""
 
 

@@ -31,7 +31,7 @@ class Diffraction(RadialTransfer):
 
     name = "diffraction"
     reference = "Chen 2003, section 2.2.1; Goodman, Introduction to Fourier Optics, section 6.3"
-    absent = "optics.diffraction is false, or psf, mtf or prescription has it"
+    absent = "optics.diffraction is false, or psf, mtf, prescription or aperture has it"
     origin = "lens"
     largest_loss = 1.0
 

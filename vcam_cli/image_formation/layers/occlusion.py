@@ -34,6 +34,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.physics.opening import CIRCLE, Opening
 from vcam_cli.scenes.cells import cell_means
 
 TURNS = (math.sqrt(5) - 1) / 2, math.sqrt(2) - 1
@@ -104,30 +105,34 @@ class RayLayer:
         return np.floor(met).astype(int)
 
 
-def rays(count: int, kind: int) -> Array:
+def rays(count: int, kind: int, opening: Opening = CIRCLE) -> Array:
     """Return rays (n, 5): a point of the aperture [radii], an instant and a place, 0 to 1.
 
     Parameters
     ----------
     count : int
-        Number of rays.
+        Number of rays; of an opening that is no circle about as many.
     kind : int
         0 or 1: which of two sets that share neither radii nor angles.
+    opening : Opening, optional
+        Shape of the aperture.
 
     Returns
     -------
     Array
-        Rays, which fill the disc evenly on a spiral [1]_.
+        Rays, which fill the disc, or what of it is open, evenly on a spiral [1]_.
 
     References
     ----------
     .. [1] H. Vogel, "A better way to construct the sunflower head", Math. Biosciences 44, 179-189,
        1979, doi:10.1016/0025-5564(79)90080-4.
     """
+    count = round(count / opening.share)
     k = np.arange(count) + 0.5
     radius, angle = np.sqrt(k / count), 2 * np.pi * TURNS[kind] * k
     rest = np.outer(k, STEPS[kind]) % 1
-    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), rest])
+    x, y = radius * np.cos(angle), radius * np.sin(angle)
+    return np.column_stack([x, y, rest])[opening.contains(x, y)]
 
 
 def front_to_back(layers: Sequence[Planes]) -> Array:

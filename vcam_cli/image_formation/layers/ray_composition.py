@@ -17,8 +17,10 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import pixel_centers
+from vcam_cli.effects.optics.shaped_blur import opening_of
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.parallel import each
+from vcam_cli.physics.opening import CIRCLE, Opening
 from vcam_cli.scenes.cells import cell_means
 from vcam_cli.scenes.depth_scene import DepthScene
 
@@ -126,7 +128,8 @@ def ray_correction(path: OpticalPath, scene: DepthScene, full: float) -> RayCorr
 
     def on_cells(width: float) -> _Cells:
         together = max(round(width / scene.flat.pitch_x), 1)
-        return _Cells(scene, light, together, path.workers)
+        opening = opening_of(e for layer in path.layers for e in layer.effects)
+        return _Cells(scene, light, together, path.workers, opening)
 
     finest = max(pitch / FINEST, float(np.abs(radii).max()) / FARTHEST)
     cells = on_cells(max(blur, finest))
@@ -164,6 +167,8 @@ class _Cells:
     together: int
     """Samples along the side of a cell."""
     workers: int
+    opening: Opening
+    """Shape of the aperture."""
     values: int = 0
 
     @property
@@ -208,13 +213,14 @@ class _Cells:
         layers = list(self._layers(self.light, tile, reach))
         means = [np.zeros((len(p), TILE, TILE), p.dtype) for _, p, _ in layers]
         total: Array | float = 0.0
-        for u, v in aperture_points(RAYS):
+        points = aperture_points(RAYS, self.opening)
+        for u, v in points:
             seen = [_moved(p, radius * u, radius * v, reach) for radius, p, _ in layers]
             total = total + self._composed(layers, seen)
             for mean, one in zip(means, seen, strict=True):
-                mean += one / RAYS
-        lacking = np.asarray(total / RAYS - self._composed(layers, means))
-        return lacking, RAYS * sum(mean.size for mean in means)
+                mean += one / len(points)
+        lacking = np.asarray(total / len(points) - self._composed(layers, means))
+        return lacking, len(points) * sum(mean.size for mean in means)
 
     def _composed(self, layers: list[tuple[float, Array, bool]], planes: list[Array]) -> Array:
         """Return light and the share of what is hidden in it (C + 1, h, w)."""
@@ -263,27 +269,32 @@ class _Cells:
                 yield radii[layer] / self.width, means, hidden
 
 
-def aperture_points(count: int) -> Iterator[tuple[float, float]]:
-    """Yield points of equal shares of a disc's area, in its radii: a spiral of golden angles.
+def aperture_points(count: int, opening: Opening = CIRCLE) -> list[tuple[float, float]]:
+    """Return points of equal shares of an aperture's area, in its radii: a spiral of golden angles.
 
     Parameters
     ----------
     count : int
-        Number of points.
+        Number of points; of an opening that is no circle about as many.
+    opening : Opening, optional
+        Shape of the aperture.
 
-    Yields
-    ------
-    tuple of float
-        Point (x, y) [radii].
+    Returns
+    -------
+    list of tuple
+        Points (x, y) [radii].
 
     References
     ----------
     .. [1] H. Vogel, "A better way to construct the sunflower head", Math. Biosciences 44, 179-189,
        1979, doi:10.1016/0025-5564(79)90080-4.
     """
+    count = round(count / opening.share)
+    points = []
     for k in range(count):
         radius, angle = math.sqrt((k + 0.5) / count), math.pi * (1 + math.sqrt(5)) * (k + 0.5)
-        yield radius * math.cos(angle), radius * math.sin(angle)
+        points.append((radius * math.cos(angle), radius * math.sin(angle)))
+    return [point for point in points if opening.contains(*map(np.asarray, point))]
 
 
 def _mirrored(index: Array, count: int) -> Array:

@@ -19,13 +19,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.optics.diffraction import Diffraction
+from vcam_cli.effects.optics.shaped_blur import opening_of
 from vcam_cli.image_formation.estimates.bandwidth import line_spread_tail
 from vcam_cli.image_formation.layers.occlusion import (
     Compose,
@@ -37,6 +38,7 @@ from vcam_cli.image_formation.layers.occlusion import (
 from vcam_cli.image_formation.layers.ray_cells import BORDER, Cells, SharpImage, Window
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.parallel import results
+from vcam_cli.physics.opening import Opening
 
 LEVELS = (
     (1, 6), (2, 12), (3, 30), (4, 80), (6, 180), (8, 300), (11, 500), (15, 840), (20, 1400),
@@ -113,6 +115,11 @@ class RaySum:
     def __post_init__(self) -> None:
         object.__setattr__(self, "sharp", SharpImage(self.path))
 
+    @cached_property
+    def opening(self) -> Opening:
+        """Shape of the aperture."""
+        return opening_of(e for layer in self.path.layers for e in layer.effects)
+
     def add(self, light: Array, windows: Sequence[Window], allowed: float) -> Hidden:
         """Add the covariance in windows to the light of pixels.
 
@@ -184,10 +191,12 @@ class RaySum:
     def _summed(self, level: int, cells: Cells, layers: Sequence[RayLayer]) -> _Sum:
         """Return the sum of a level."""
         count, dtype = LEVELS[level][1], self.path.settings.dtype
-        groups = self.sharp.groups(rays(count, level % 2))
+        groups = self.sharp.groups(rays(count, level % 2, self.opening))
         seen = partial(self.sharp.at_pixels, cells)
         light = covariance(layers, groups, cells.reach, seen, self.compose)
-        values = count * len(layers) * len(layers[0].planes) * math.prod(cells.inner)
+        values = (
+            sum(map(len, groups)) * len(layers) * len(layers[0].planes) * math.prod(cells.inner)
+        )
         return _Sum(cells.window, level, light.astype(dtype), values=values)
 
 
