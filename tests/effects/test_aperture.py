@@ -111,6 +111,12 @@ def test_in_focus_an_annulus_has_the_closed_forms_contrast(tmp_path):
     assert amplitude / level == pytest.approx(expected, abs=1e-3)
 
 
+def test_a_shape_that_is_a_circle_is_refused(tmp_path):
+    for shape in ({}, {"rotation": "5 deg"}, {"obscuration": "30 %", "rotation": "5 deg"}):
+        with pytest.raises(BadInput, match="circle"):
+            camera(tmp_path, {"optics.aperture": shape})
+
+
 WRONG = {
     "optics.diffraction": (False, "is simulated with diffraction"),
     "optics.zernike": ([{"field": 1, 4: "0.1 um"}], "the same all over the field"),

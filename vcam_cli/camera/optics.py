@@ -3,7 +3,7 @@
 import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -213,6 +213,15 @@ class Spiders(Model):
     )
 
 
+def _has_shape(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
+    """Refuse a shape that is a circle, and a direction of one without corners."""
+    if not any(given.get(name) for name in ("blades", "obscuration", "spiders")):
+        yield fault((), "describes a circle", "write circle, or add blades: 6", given)
+    elif given.get("rotation") and not any(given.get(name) for name in ("blades", "spiders")):
+        message = "a circle looks the same from all sides"
+        yield fault(("rotation",), message, "remove rotation, or add blades: 6", given["rotation"])
+
+
 class ApertureShape(Model):
     """The shape of the lens's aperture, inside the circle that the f-number counts."""
 
@@ -234,18 +243,19 @@ class ApertureShape(Model):
         "vanes across the aperture", example={"count": 4, "width": "2 %"}, default=None
     )
 
+    rules = (_has_shape,)
+
     @property
     def opening(self) -> Opening:
         """The shape in radii of the circle."""
         vanes = self.spiders
-        found = Opening(
+        return Opening(
             self.blades or 0,
             self.rotation,
             self.obscuration,
             vanes.count if vanes else 0,
             vanes.width if vanes else 0.0,
         )
-        return replace(found, rotation=0.0) if not (found.blades or found.spiders) else found
 
 
 def _aperture(given: Any) -> ApertureShape | None:
