@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 SOURCES := vcam_cli tests scripts
 CAMERA ?= still-life
 
-.PHONY: run test test-all lint check bench check-gpu bench-gpu interchange promise stability docs figures fuzz attacks schemas tables thesis lock clean
+.PHONY: run test test-all lint check bench check-gpu bench-gpu interchange lenses promise stability docs figures fuzz attacks schemas tables thesis lock clean
 
 run: $(VENV)/.runtime  ## simulate the shipped still life: out/still-life/
 	$(BIN)/vcam run $(CAMERA)
@@ -33,6 +33,9 @@ check-gpu: $(VENV)/.dev  ## a graphics processor: its numbers, transforms, frame
 
 bench-gpu: $(VENV)/.dev  ## its speed, as ratios to bare transforms, draws and copies
 	$(BIN)/python -m tests.gpu bench
+
+lenses: $(VENV)/.dev  ## shipped lenses traced: largest differences from another tracer, as a table
+	$(BIN)/python -m tests.lenses
 
 interchange: $(VENV)/.dev  ## raw.dng in other people's readers: bits, colors and seconds, as a table
 	$(BIN)/python -m tests.interchange
