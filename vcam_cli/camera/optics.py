@@ -500,7 +500,8 @@ class Optics(Model):
     field_of_view: Annotated[
         FieldOfView | None, Either(_field_of_view, str | FieldOfView, yaml_form=_written_field)
     ] = key(
-        "full angle over the array's diagonal, or {horizontal: 90 deg}; may replace focal_length",
+        "full angle over the array's diagonal, or {horizontal: 90 deg}, through projection and "
+        "distortion; may replace focal_length",
         unit="deg",
         example="46 deg",
         default=None,
@@ -647,6 +648,16 @@ class Optics(Model):
         one_projection,
         _shaped_alone,
     )
+
+    @property
+    def mapping_name(self) -> str:
+        """Name of how field angles are imaged."""
+        if self.prescription is not None:
+            return "traced"
+        model = getattr(self.distortion, "model", "table") if self.distortion else ""
+        if model == "fisheye":
+            return "equidistant, distorted (OpenCV's fisheye model)"
+        return f"{self.projection}, distorted" if model else self.projection
 
     @property
     def opening(self) -> Opening:

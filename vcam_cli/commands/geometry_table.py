@@ -8,7 +8,9 @@ from collections.abc import Iterator, Mapping
 Row = tuple[str, str]
 
 
-def geometry_table(geometry: Mapping[str, float], step: float, band: tuple[float, float]) -> str:
+def geometry_table(
+    geometry: Mapping[str, float], step: float, band: tuple[float, float], projection: str = ""
+) -> str:
     """Return the tables as text.
 
     Parameters
@@ -19,16 +21,23 @@ def geometry_table(geometry: Mapping[str, float], step: float, band: tuple[float
         Step of the wavelengths at which the lens's blur is evaluated [m].
     band : tuple of float
         First and last wavelength that is simulated [m].
+    projection : str, optional
+        Name of the lens's projection.
     """
-    lens = _optics(geometry) if math.isfinite(geometry["f_number"]) else [("none", "a bare sensor")]
-    parts = (("scene", _scene(geometry, step, band)), ("optics", lens))
+    bare = math.isinf(geometry["f_number"])
+    lens = [("none", "a bare sensor")] if bare else list(_optics(geometry, projection))
+    is_even = projection in ("", "rectilinear")
+    parts = (("scene", list(_scene(geometry, step, band, is_even))), ("optics", lens))
     lines = []
     for title, rows in parts:
         lines += [title, *(f"  {name:<24}{value}" for name, value in rows)]
     return "\n".join(lines)
 
 
-def _scene(g: Mapping[str, float], step: float, band: tuple[float, float]) -> Iterator[Row]:
+def _scene(
+    g: Mapping[str, float], step: float, band: tuple[float, float], is_even: bool
+) -> Iterator[Row]:
+    """Yield the rows of the scene, whose samples have even distances where no lens distorts it."""
     width, height = g["scene_width"], g["scene_height"]
     yield "distance", _length(g["object_distance"])
     yield "magnification", f"{g['magnification']:.6g}"
@@ -39,13 +48,15 @@ def _scene(g: Mapping[str, float], step: float, band: tuple[float, float]) -> It
         yield "samples", "none: the scene's spectrum is known in closed form"
     else:
         pitch = f"{g['sample_pitch_sensor'] * 1e6:.4g} um on the sensor"
-        yield "angular resolution", f"{g['sample_pitch_angle'] * 1e3:.4g} mrad"
-        yield "spatial resolution", f"{_length(g['sample_pitch_scene'])}, {pitch}"
+        where = "" if is_even else " on the axis"
+        yield "angular resolution", f"{g['sample_pitch_angle'] * 1e3:.4g} mrad{where}"
+        yield "spatial resolution", f"{_length(g['sample_pitch_scene'])}{where}, {pitch}"
         yield "rows, columns", f"{g['scene_rows']} x {g['scene_columns']}, seen by the array"
         rows = _centers(int(g["scene_rows"]), g)
         columns = _centers(int(g["scene_columns"]), g)
-        yield "row coordinates", rows + ", downward from the axis"
-        yield "column coordinates", columns + ", to the right"
+        if is_even:
+            yield "row coordinates", rows + ", downward from the axis"
+            yield "column coordinates", columns + ", to the right"
         yield "highest frequency", f"{g['highest_frequency'] / 1e3:.5g} lp/mm"
         yield "support of fx", _support(g["highest_frequency"], g["sensor_width"])
         yield "support of fy", _support(g["highest_frequency"], g["sensor_height"])
@@ -54,7 +65,9 @@ def _scene(g: Mapping[str, float], step: float, band: tuple[float, float]) -> It
     yield "wavelengths", f"{number}, {ends} in steps of {step * 1e9:.4g} nm at most"
 
 
-def _optics(g: Mapping[str, float]) -> Iterator[Row]:
+def _optics(g: Mapping[str, float], projection: str) -> Iterator[Row]:
+    if projection:
+        yield "projection", projection
     yield "fx, fy", f"{g['focal_pixels_x']:.6g}, {g['focal_pixels_y']:.6g} pixels"
     yield "f-number", f"{g['f_number']:.6g}, working {g['working_f_number']:.6g}"
     yield "focal length", f"{g['focal_length'] * 1e3:.6g} mm"

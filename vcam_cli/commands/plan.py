@@ -136,7 +136,8 @@ def plan(
 
         band = model.scene.wavelengths
         step = report["settings"]["wavelength_step"]
-        print(geometry_table(solved, step, (band.start, band.stop)))
+        imaged = model.optics.mapping_name if model.optics.is_lens else ""
+        print(geometry_table(solved, step, (band.start, band.stop), imaged))
     else:
         told = facts(report, solved, ready.exposure_time, ready.times, rate_of_frames)
         if details:

@@ -9,7 +9,8 @@ for stacked pixels, which have all their colors.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -39,6 +40,8 @@ class Layout:
     places: Places | None = None
     binning_groups: BinningGroups = ALONE
     """Which places of the lattice are read as one."""
+    seen: Mapping[str, float] = field(default_factory=dict)
+    """Numbers of the geometry that a lens changes by distortion."""
 
     @property
     def is_scattered(self) -> bool:
@@ -79,7 +82,7 @@ class Layout:
             Names and numbers of the geometry.
         """
         finer = self.geometry.pitch_x / self.lattice.pitch_x
-        return self.geometry.report(oversampling * finer)
+        return self.geometry.report(oversampling * finer) | dict(self.seen)
 
     def settings(self, settings: Settings) -> Settings:
         """Return the settings for the lattice; a fine one is sampled finely enough.

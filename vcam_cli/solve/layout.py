@@ -8,6 +8,7 @@ from dataclasses import replace
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.lattice import places
+from vcam_cli.camera.derived.lens_mapping import fields_of_view
 from vcam_cli.camera.derived.mosaic import Mosaic, channel_order, mosaic
 from vcam_cli.camera.sensor.array import Binning, Positions
 from vcam_cli.errors import CannotDo, Collector, bad
@@ -49,6 +50,11 @@ def camera_layout(camera: Camera, geometry: Geometry) -> Layout:
     CannotDo
         Where the positions of pixels need too fine a lattice.
     """
+    found = _pixels(camera, geometry)
+    return replace(found, seen=fields_of_view(camera, geometry))
+
+
+def _pixels(camera: Camera, geometry: Geometry) -> Layout:
     pattern = camera.array.pattern
     if pattern == "stacked":
         colors = channel_order(camera.array.colors)

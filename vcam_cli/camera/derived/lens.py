@@ -6,10 +6,14 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from vcam_cli.camera.derived.lattice import lattice
+from vcam_cli.camera.derived.lens_models import distortion_table, half_extent
 from vcam_cli.camera.derived.prescription import traced_lens
+from vcam_cli.camera.lens_distortion import DistortionFile
 from vcam_cli.camera.model import CameraModel
-from vcam_cli.camera.optics import LEAST_F_NUMBER, MOST_F_NUMBER
+from vcam_cli.camera.optics import LEAST_F_NUMBER, MOST_F_NUMBER, Optics
 from vcam_cli.camera.sensor.pixel import AGREE
 from vcam_cli.errors import bad
 from vcam_cli.physics import radiometry
@@ -146,10 +150,7 @@ def _focal_length(camera: CameraModel) -> float:
         found["focal_length"] = optics.focal_length
     if optics.field_of_view is not None:
         pixels = lattice(camera)
-        angle, extent = optics.field_of_view.angle_and_extent(pixels.width, pixels.height)
-        found["field_of_view"] = float(
-            radiometry.focal_length_of_field_of_view(angle, extent, distance)
-        )
+        found["field_of_view"] = _seen_by(optics, pixels.width, pixels.height, distance)
     if optics.aperture_diameter is not None:
         if optics.f_number is not None:
             found["aperture_diameter"] = optics.aperture_diameter * optics.f_number
@@ -161,6 +162,28 @@ def _focal_length(camera: CameraModel) -> float:
     if not found:
         raise bad("optics", "the lens is not determined: its focal length is missing", _GIVE_TWO)
     return _common_value(found, "a focal length of ", lambda length: f"{length * 1e3:.6g} mm")
+
+
+def _seen_by(optics: Optics, width: float, height: float, distance: float) -> float:
+    """Return the focal length with which a lens sees its field of view, by its projection."""
+    given = optics.field_of_view
+    assert given is not None
+    angle, extent = given.angle_and_extent(width, height)
+    along_x = given.vertical is None, given.horizontal is None
+    way = width * along_x[0], height * along_x[1]
+    if isinstance(optics.distortion, DistortionFile):  # in millimeters of the distorted image
+        table = distortion_table(optics.distortion.file)
+        at = np.array([extent / 2])
+        extent = 2 * float(table.undistort(at, np.zeros(1))[0][0])
+    half = half_extent(optics, angle / 2, *way)
+    if not half > 0:
+        raise bad(
+            "optics.field_of_view",
+            f"no height of the image has the field angle {math.degrees(angle / 2):.4g} deg",
+            "check the coefficients of distortion, or give focal_length",
+        )
+    pinhole = 2 * math.atan(half)
+    return float(radiometry.focal_length_of_field_of_view(pinhole, extent, distance))
 
 
 def _focal_length_of_cone(cone: float, distance: float, pupil: float | None) -> float:

@@ -8,24 +8,14 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry, geometry
+from vcam_cli.camera.derived.lens_models import PATH, distortion_table, stated_mappings
 from vcam_cli.camera.derived.prescription import distortion as traced_distortion
 from vcam_cli.camera.derived.prescription import sensor_view, traced_lens
-from vcam_cli.camera.lens_distortion import DistortionFile, FisheyeDistortion, OpenCvDistortion
+from vcam_cli.camera.lens_distortion import DistortionFile, OpenCvDistortion
 from vcam_cli.camera.model import CameraModel
-from vcam_cli.errors import bad, data_file_problems
-from vcam_cli.physics.distortion import (
-    BrownConrady,
-    Chain,
-    DistortionTable,
-    Fisheye,
-    Mapping,
-    Projection,
-)
-from vcam_cli.spectra.text import read_rows
+from vcam_cli.errors import bad
+from vcam_cli.physics.distortion import Chain, DistortionTable, Mapping
 
-PATH = ("optics", "distortion")
-HEADER = ("image_height_mm", "distortion_percent")
-REMEDY = "write the columns image_height_mm,distortion_percent, heights rising from 0"
 WIDEST = math.radians(85)
 """Field angle up to which a flat scene is imaged: 11 focal lengths from the axis [rad]."""
 BORDER = 129
@@ -43,25 +33,17 @@ def lens_mapping(camera: CameraModel, geometry: Geometry) -> Mapping | None:
     BadInput
         For a file that cannot be read or is no such table.
     """
-    optics, found = camera.optics, list[Mapping]()
-    if optics.projection != "rectilinear" and not isinstance(optics.distortion, FisheyeDistortion):
-        found.append(Projection(optics.projection))
-    match optics.distortion:
-        case OpenCvDistortion() as given:
-            mapping = BrownConrady(**given.model_dump(exclude={"model"}))
-            found += [] if mapping.is_identity else [mapping]
-        case FisheyeDistortion() as given:
-            found.append(Fisheye(**given.model_dump(exclude={"model"})))
-        case DistortionFile(file=file):
-            heights, distortions = _table(file)
-            scaled = tuple((heights / geometry.image_distance).tolist())
-            found.append(DistortionTable(scaled, tuple(distortions.tolist())))
+    optics, found = camera.optics, stated_mappings(camera.optics)
+    if isinstance(optics.distortion, DistortionFile):
+        table = distortion_table(optics.distortion.file)
+        scaled = tuple(height / geometry.image_distance for height in table.heights)
+        found.append(DistortionTable(scaled, table.distortions))
     if traced := traced_lens(camera):
         view = sensor_view(traced, geometry.object_distance, optics.defocus)
         corner = math.hypot(geometry.sensor_width, geometry.sensor_height) / 2
-        table = traced_distortion(view, corner)
-        scaled = tuple(height / geometry.image_distance for height in table.heights)
-        found.append(DistortionTable(scaled, table.values))
+        own = traced_distortion(view, corner)
+        scaled = tuple(height / geometry.image_distance for height in own.heights)
+        found.append(DistortionTable(scaled, own.values))
     if not found:
         return None
     return found[0] if len(found) == 1 else Chain(tuple(found))
@@ -118,19 +100,35 @@ def border(geometry: Geometry) -> tuple[Array, Array]:
     return x, y
 
 
-def _table(file: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return heights [m] and distortions of a file. Raises BadInput."""
-    path = (*PATH, "file")
-    with data_file_problems(file, path, REMEDY):
-        header, rows = read_rows(file)
-        if tuple(header) != HEADER:
-            raise ValueError(f"{file}: the header is {','.join(header)!r}")
-        if len(rows) < 2:
-            raise ValueError(f"{file}: has fewer than two rows below its header")
-        heights, percent = rows.T
-        if heights[0] < 0 or (np.diff(heights) <= 0).any():
-            raise ValueError(f"{file}: image heights do not rise from 0")
-        table = DistortionTable(tuple(heights.tolist()), tuple((percent / 100).tolist()))
-        if not table.is_monotonic:
-            raise ValueError(f"{file}: folds the image, ideal heights fall where real ones rise")
-    return heights / 1e3, percent / 100
+def fields_of_view(camera: CameraModel, geometry: Geometry) -> dict[str, float]:
+    """Return what a lens that distorts sees, in the places of the pinhole's numbers.
+
+    Parameters
+    ----------
+    camera : CameraModel
+        Camera as its file describes it.
+    geometry : Geometry
+        Geometry of the array.
+
+    Returns
+    -------
+    dict
+        Fields of view [rad] and sizes of the seen scene [m] by their names in `Geometry.report`;
+        empty for a lens that does not distort.
+    """
+    mapping = lens_mapping(camera, geometry) if camera.optics.is_lens else None
+    if mapping is None:
+        return {}
+    half = geometry.sensor_width / 2, geometry.sensor_height / 2
+    ends = {"horizontal": (half[0], 0.0), "vertical": (0.0, half[1]), "diagonal": half}
+    names = {"horizontal": "scene_width", "vertical": "scene_height", "diagonal": "scene_diagonal"}
+    found = {}
+    for name, (x, y) in ends.items():
+        both = np.array([x, -x]), np.array([y, -y])
+        u, v = mapping.undistort(*(side / geometry.image_distance for side in both))
+        away = np.hypot(u, v)
+        found[f"field_of_view_{name}"] = float(np.arctan(away).sum())
+        if math.isfinite(geometry.object_distance):
+            scale = geometry.image_distance / geometry.scene_scale
+            found[names[name]] = float(away.sum() * scale)
+    return found
