@@ -30,10 +30,10 @@ def test_a_projection_sees_its_field_of_view(tmp_path, name, side):
     half = {"horizontal": WIDTH, "vertical": HEIGHT, "diagonal": math.hypot(WIDTH, HEIGHT)}[
         side
     ] / 2
-    changes = {"optics.projection": name, "optics.field_of_view": {side: "80 deg"}}
+    changes = {"optics.projection": name, "optics.field_of_view": {side: "70 deg"}}
     found, angles = seen(tmp_path, changes)
-    assert found.focal_length == pytest.approx(half / HEIGHTS[name](math.radians(40)), rel=1e-12)
-    assert angles[f"field_of_view_{side}"] == pytest.approx(math.radians(80), rel=1e-9)
+    assert found.focal_length == pytest.approx(half / HEIGHTS[name](math.radians(35)), rel=1e-12)
+    assert angles[f"field_of_view_{side}"] == pytest.approx(math.radians(70), rel=1e-9)
 
 
 @pytest.mark.parametrize(
