@@ -6,13 +6,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.devices.processor import Processor
-from vcam_cli.effects.base import Effect
+from vcam_cli.effects.base import Effect, of_kind
+from vcam_cli.effects.pixel_signal import Transport
 from vcam_cli.effects.signal_chain import electron_effects, full_well
 from vcam_cli.errors import CannotDo
 from vcam_cli.readout import exposure
@@ -89,13 +89,12 @@ class BatchCamera:
         """
         camera = self.at_gain(gain)
         effects, adc = camera.effects, camera.chain.adc
-        time: Any = times[0]
-        if any(other != time for other in times):
-            column: Array = np.array(times, self.dtype)[:, None, None]
-            time = self.device.put(column)
-        here = sites(self.maps, seeds, exposure.mean_dark(time, effects))
+        rate = exposure.mean_dark(1.0, effects)
+        time, dark = self._columns(times), self._columns([rate * time for time in times])
+        here = sites(self.maps, seeds, dark)
         in_front = electron_effects(effects, behind_well=False)
-        held = exposure.mean_electrons(rates, time, effects)
+        held = rates * time
+        held += dark
         clean = self._levels(held, camera)
         tile = exposure.in_wells(exposure.lifted(held, effects, here), in_front, here)
         kind = exposure.codes_type(adc.bits)
@@ -104,6 +103,11 @@ class BatchCamera:
             return self.device.on_line(tile, math.inf, adc.line, adc.highest_code, kind), clean
         codes = exposure.codes(tile, effects, adc, here, camera.pedestal)
         return codes.astype(kind), clean
+
+    def _columns(self, values: Sequence[float]) -> Array:
+        """Return a number of each frame (B, 1, 1) on the device."""
+        column: Array = np.array(values, self.dtype)[:, None, None]
+        return self.device.put(column)
 
     def _levels(self, held: Array, camera: _AtGain) -> Array:
         """Return the codes of mean signals without rounding [DN]."""
@@ -134,6 +138,7 @@ def refuse_unsupported(solved: Solved, device: Processor) -> None:
         (layout.is_scattered or layout.planes, "pixels in no rows and columns, or stacked ones"),
         (coupled or bool(solved.pixel.blooming), "interpixel capacitance and blooming"),
         (solved.pixel.phase_detection is not None, "phase detection"),
+        (bool(of_kind(solved.effects.enabled, Transport)), "charge transfer"),
     ):
         if refused:
             message = f"{what}: not computed in batches of frames"

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import islice
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,16 +15,16 @@ from vcam_cli.arguments import brief, require_whole
 from vcam_cli.arrays import Array
 from vcam_cli.batches.batch_camera import BatchCamera, refuse_unsupported
 from vcam_cli.batches.light import DeviceLight, ProcessorLight, pictures_light, seen_by
+from vcam_cli.batches.pictures import Places, linear_pictures, stacks
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.scene.scene_files import ImageFile
 from vcam_cli.devices.choice import open_device
 from vcam_cli.devices.processor import Processor, require
 from vcam_cli.effects.base import of_kind
-from vcam_cli.effects.pixel_signal import TemporalGain, Transport
+from vcam_cli.effects.pixel_signal import TemporalGain
 from vcam_cli.effects.signal_chain import noise_sources
 from vcam_cli.effects.warps import ImageMotion
-from vcam_cli.errors import BadInput, CannotDo, bad
-from vcam_cli.files.images.color import decode_srgb
+from vcam_cli.errors import BadInput, CannotDo
 from vcam_cli.floats import own_float_errors
 from vcam_cli.parallel import suitable_workers
 from vcam_cli.processing.demosaic import bilinear_rows
@@ -125,10 +122,10 @@ def frames(
     gains: Numbers = None,
     seeds: Sequence[int] | Callable[[int], int] | None = None,
     crop: tuple[int, int] | None = None,
-    places: Sequence[tuple[int, int]] | Callable[[int], tuple[int, int]] | None = None,
+    places: Places = None,
     workers: int | None = None,
 ) -> Iterator[FrameBatch]:
-    """Yield batches of frames of a camera, with and without noise.
+    """Return batches of frames of a camera, with and without noise, one after the other.
 
     All effects act that the camera has, and nothing is skipped. The light is computed once for all
     frames of a picture. Frames are the same for any `batch`.
@@ -152,7 +149,7 @@ def frames(
         Exposure times [s]: of all frames, one of each, or by the frame's number; by default the
         camera's, which may be automatic.
     gains : float, sequence or callable, optional
-        Analog gains of the exposure, likewise. Each other gain in a batch takes 0.2 ms.
+        Analog gains of the exposure, likewise.
     seeds : sequence of int or callable, optional
         Frame seeds, likewise; by default drawn from the camera's frame seed and the number.
     crop : tuple of int, optional
@@ -162,9 +159,9 @@ def frames(
     workers : int, optional
         Number of threads of the processor.
 
-    Yields
-    ------
-    FrameBatch
+    Returns
+    -------
+    iterator of FrameBatch
         Frames in the order of the pictures.
 
     Raises
@@ -179,19 +176,9 @@ def frames(
     for value, name in ((batch, "batch"), (frames_each, "frames_each")):
         require_whole(value, name, 1)
     found = open_device(device) if isinstance(device, str) else device
+    stacked = stacks(pictures, max(1, batch // frames_each), camera, found, crop, places)
     asked = _Asked(times, gains, seeds, frames_each)
-    with found.errors():
-        try:
-            yield from _batches(
-                camera,
-                _stacks(pictures, max(1, batch // frames_each), camera, found, crop, places),
-                found,
-                asked,
-                batch,
-                workers,
-            )
-        except BadInput as error:
-            raise error.with_places(camera.locate) from None
+    return _batches(camera, stacked, found, asked, batch, workers)
 
 
 @dataclass(frozen=True)
@@ -223,31 +210,40 @@ class _Asked:
 
 def _batches(
     camera: Camera,
-    stacks: Iterable[Any],
+    stacked: Iterable[Any],
     device: Processor,
     asked: _Asked,
     batch: int,
     workers: int | None,
 ) -> Iterator[FrameBatch]:
-    first, taker, light, first_picture = 0, None, None, 0
-    shape: tuple[int, ...] | None = None
-    for stack in stacks:
-        if shape is None:
-            shape = stack.shape[1:]
-            solved = solved_for(camera)
-            taker, light, white = ready(solved, shape, device, workers)
-            _check_times(solved, light, asked)
-        if stack.shape[1:] != shape:
-            raise ValueError(f"pictures of shape {stack.shape[1:]} and {shape}; write one shape")
-        assert taker is not None and light is not None
-        count = len(stack) * asked.frames_each
-        _require(device, light, taker, len(stack), shape, min(count, max(batch, asked.frames_each)))
-        rates = own_float_errors(light.rates)(linear_pictures(stack, device, camera))
-        for start in range(0, count, max(batch, 1)):
-            numbers = range(first + start, first + min(start + batch, count))
-            shown = [(number - first) // asked.frames_each for number in numbers]
-            yield _taken(taker, asked, rates, shown, numbers, first_picture, white)
-        first, first_picture = first + count, first_picture + len(stack)
+    """Yield the batches of stacked pictures; see `frames`."""
+    first = first_picture = 0
+    camera_of: tuple[BatchCamera, DeviceLight | ProcessorLight, float] | None = None
+    shape: tuple[int, ...] = ()
+    fitting: set[tuple[int, int]] = set()
+    for stack in stacked:
+        with device.errors():
+            try:
+                if camera_of is None:
+                    shape, solved = stack.shape[1:], solved_for(camera)
+                    _check_times(solved, asked)
+                    camera_of = ready(solved, shape, device, workers)
+            except BadInput as error:
+                raise error.with_places(camera.locate) from None
+            if stack.shape[1:] != shape:
+                raise ValueError(f"pictures of shape {stack.shape[1:]} and {shape}; write one")
+            taker, light, white = camera_of
+            count = len(stack) * asked.frames_each
+            size = len(stack), min(count, batch)
+            if size not in fitting:
+                _require(device, light, taker, *size, shape[-1])
+                fitting.add(size)
+            rates = own_float_errors(light.rates)(linear_pictures(stack, device, camera))
+            for start in range(0, count, batch):
+                numbers = range(first + start, first + min(start + batch, count))
+                shown = [(number - first) // asked.frames_each for number in numbers]
+                yield _taken(taker, asked, rates, shown, numbers, first_picture, white)
+            first, first_picture = first + count, first_picture + len(stack)
 
 
 def solved_for(camera: Camera) -> Solved:
@@ -305,16 +301,38 @@ def ready(
     return BatchCamera(solved, device, dtype), light, float(seen.white_rate.max())
 
 
-def _check_times(solved: Solved, light: DeviceLight | ProcessorLight, asked: _Asked) -> None:
+def _check_times(solved: Solved, asked: _Asked) -> None:
     """Raise CannotDo where light depends on an exposure time that frames do not share."""
-    timed = of_kind(solved.effects.enabled, TemporalGain, Transport)
-    moving = of_kind(solved.effects.enabled, ImageMotion)
-    if (timed or moving) and (asked.times is not None or solved.exposure.auto is not None):
-        names = ", ".join(effect.name for effect in (*timed, *moving))
+    names = timed_effects(solved)
+    if names and (asked.times is not None or solved.exposure.auto is not None):
         raise CannotDo(
-            f"{names}: the light depends on the exposure time",
+            f"{', '.join(names)}: the light depends on the exposure time",
             "write one exposure.time in the camera, and no times",
         )
+
+
+def timed_effects(solved: Solved) -> list[str]:
+    """Return the names of effects by which the light depends on the exposure time.
+
+    Parameters
+    ----------
+    solved : Solved
+        The camera.
+    """
+    effects = solved.effects.enabled
+    return [effect.name for effect in of_kind(effects, TemporalGain, ImageMotion)]
+
+
+def frame_bytes(taker: BatchCamera) -> int:
+    """Return the memory of the device that a frame takes while its noise is drawn [bytes].
+
+    Parameters
+    ----------
+    taker : BatchCamera
+        The camera.
+    """
+    g = taker.solved.geometry
+    return g.rows * g.columns * VALUES * np.dtype(taker.dtype).itemsize
 
 
 def _require(
@@ -322,13 +340,12 @@ def _require(
     light: DeviceLight | ProcessorLight,
     taker: BatchCamera,
     pictures: int,
-    shape: tuple[int, ...],
     count: int,
+    channels: int,
 ) -> None:
     """Raise CannotDo where a batch does not fit into the memory of the device."""
     g = taker.solved.geometry
-    values = count * g.rows * g.columns * VALUES * np.dtype(taker.dtype).itemsize
-    needed = values + pictures * light.bytes_per_picture(shape[-1])
+    needed = count * frame_bytes(taker) + pictures * light.bytes_per_picture(channels)
     require(device, needed, f"{count} frames of {g.rows} x {g.columns} pixels")
 
 
@@ -415,104 +432,3 @@ def _labels(taker: BatchCamera, gain: float, time: float) -> tuple[float, float,
     variance = sum(s.variance(dark, dark) for s in noise_sources(camera.effects, "frame"))
     system = camera.chain.system_gain
     return camera.chain.black_dn(dark), system, system**2 * variance
-
-
-def _stacks(
-    pictures: Iterable[Any],
-    count: int,
-    camera: Camera,
-    device: Processor,
-    crop: tuple[int, int] | None,
-    places: Sequence[tuple[int, int]] | Callable[[int], tuple[int, int]] | None,
-) -> Iterator[Any]:
-    """Yield arrays (n, rows, columns, channels) of up to `count` pictures, cut to the crop."""
-
-    def window(picture: Any, number: int) -> Any:
-        if crop is None:
-            return picture
-        rows, columns = picture.shape[:2]
-        top, left = (rows - crop[0]) // 2, (columns - crop[1]) // 2
-        if places is not None:
-            top, left = places(number) if callable(places) else places[number]
-        if not (0 <= top <= rows - crop[0] and 0 <= left <= columns - crop[1]):
-            raise ValueError(f"picture {number}: no crop of {crop} at {(top, left)} lies inside")
-        return picture[top : top + crop[0], left : left + crop[1]]
-
-    if getattr(pictures, "ndim", 0) == 4:
-        whole: Any = pictures
-        for start in range(0, len(whole), count):
-            some = whole[start : start + count]
-            if crop is None:
-                yield some
-            else:
-                yield _stacked([window(p, start + n) for n, p in enumerate(some)], device)
-        return
-    held: list[Any] = []
-    for number, picture in enumerate(_read_ahead(pictures, camera, count)):
-        held.append(window(picture, number))
-        if len(held) == count:
-            yield _stacked(held, device)
-            held = []
-    if held:
-        yield _stacked(held, device)
-
-
-def _stacked(pictures: Sequence[Any], device: Processor) -> Any:
-    """Return pictures of one shape as an array (n, rows, columns, channels)."""
-    shaped = [p if p.ndim == 3 else p[:, :, None] for p in pictures]
-    if len({p.shape for p in shaped}) > 1:
-        raise ValueError("pictures differ in shape; write one shape, or crop")
-    return device.stacked(shaped)
-
-
-def _read_ahead(pictures: Iterable[Any], camera: Camera, count: int) -> Iterator[Any]:
-    """Yield pictures; files are decoded ahead by threads."""
-    from vcam_cli.files.images.images import read_picture
-
-    source = camera.scene.source
-    encoding, white = "auto", 1.0
-    if isinstance(source, ImageFile):
-        encoding, white = source.encoding, source.white
-
-    def read(picture: Any) -> Any:
-        if isinstance(picture, str | Path):
-            return read_picture(picture, encoding, white, ("scene", "source", "file")).data
-        if not hasattr(picture, "ndim") or picture.ndim not in (2, 3):
-            message = f"{brief(picture)} is no picture"
-            raise TypeError(f"{message}; give file names or arrays (rows, columns, channels)")
-        return picture
-
-    coming = iter(pictures)
-    with ThreadPoolExecutor(max(1, min(8, count))) as pool:
-        waiting = [pool.submit(read, picture) for picture in islice(coming, 2 * count)]
-        while waiting:
-            yield waiting.pop(0).result()
-            waiting += [pool.submit(read, picture) for picture in islice(coming, 1)]
-
-
-def linear_pictures(stack: Any, device: Processor, camera: Camera) -> Array:
-    """Return pictures in linear light on the device, 1 = white.
-
-    Parameters
-    ----------
-    stack : array
-        Pictures (n, rows, columns, channels), of the processor or of the device.
-    device : Processor
-        The device.
-    camera : Camera
-        Its scene's source says white and encoding.
-    """
-    source = camera.scene.source
-    white = source.white if isinstance(source, ImageFile) else 1.0
-    values = device.put(stack)
-    if values.dtype.kind == "u":
-        levels = np.iinfo(str(values.dtype)).max
-        codes = np.arange(levels + 1) / levels
-        linear = isinstance(source, ImageFile) and source.encoding == "linear"
-        table = codes if linear else decode_srgb(codes)
-        return np.take(device.put(table / white, np.float32), values)
-    if values.dtype.kind != "f":
-        raise bad(
-            "scene.source", f"pictures of type {values.dtype}", "write uint8, uint16 or floats"
-        )
-    return values

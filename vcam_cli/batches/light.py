@@ -14,7 +14,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.devices.processor import Processor
 from vcam_cli.effects.base import of_kind
-from vcam_cli.effects.pixel_signal import ColumnSpread, NeighborSharing, TemporalGain, Transport
+from vcam_cli.effects.pixel_signal import ColumnSpread, NeighborSharing, TemporalGain
 from vcam_cli.image_formation.batched_filter import BatchedFilter
 from vcam_cli.image_formation.photon_rate import on_mosaics
 from vcam_cli.image_formation.strategies import picture_filter
@@ -121,7 +121,7 @@ def pictures_light(
     """
     solved, scene, layout = seen.solved, seen.scene, seen.solved.layout
     by_processor = ProcessorLight(device, solved, workers)
-    late = of_kind(seen.path.effects, TemporalGain, Transport)
+    late = of_kind(seen.path.effects, TemporalGain)
     # Crosstalk and smear act behind the light, and are among the effects on charge.
     shared = of_kind(solved.effects.enabled, NeighborSharing, ColumnSpread)
     if layout.planes or layout.is_scattered or late or shared:

@@ -16,13 +16,12 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.batches.batch_camera import BatchCamera
-from vcam_cli.batches.frames import linear_pictures, metered, ready, solved_for
+from vcam_cli.batches.frames import frame_bytes, metered, ready, solved_for, timed_effects
 from vcam_cli.batches.light import DeviceLight, ProcessorLight
+from vcam_cli.batches.pictures import linear_pictures
+from vcam_cli.camera.camera import Camera
 from vcam_cli.datasets.frame_work import NPZ, FrameJob, noise_labels
-from vcam_cli.devices.processor import Processor
-from vcam_cli.effects.base import of_kind
-from vcam_cli.effects.pixel_signal import TemporalGain, Transport
-from vcam_cli.effects.warps import ImageMotion
+from vcam_cli.devices.processor import Processor, require
 from vcam_cli.errors import BadInput, CannotDo
 from vcam_cli.files.frame_archive import archive_bytes
 from vcam_cli.files.report import to_json
@@ -73,30 +72,42 @@ def compute_batches(
     ask : callable
         Whether a frame is still to be computed; it is claimed then.
     """
-    wanted = [job for job in jobs if ask(job)]
-    try:
-        batched = _Batched(wanted, device)
-        for start in range(0, len(wanted), BATCH):
+    batched = _Batched(device)
+    start = 0
+    while start < len(jobs):
+        wanted = [job for job in jobs[start : start + batched.at_once] if ask(job)]
+        start += batched.at_once
+        done: set[str] = set()
+        try:
             with device.errors():
-                yield from batched.outcomes(wanted[start : start + BATCH])
-    except BadInput as error:
-        yield from (Outcome(job.id, error=error_cell(error.problems)) for job in wanted)
-    except CannotDo as error:
-        yield from (Outcome(job.id, error=str(error), final=False) for job in wanted)
+                for outcome in batched.outcomes(wanted) if wanted else ():
+                    yield outcome
+                    done.add(outcome.id)
+        except BadInput as error:
+            said = error_cell(error.problems)
+            yield from (Outcome(job.id, error=said) for job in wanted if job.id not in done)
+        except CannotDo as error:
+            said = str(error)
+            yield from (
+                Outcome(job.id, error=said, final=False) for job in wanted if job.id not in done
+            )
 
 
 class _Batched:
     """A camera that frames have in common, and the pictures that were read last."""
 
-    def __init__(self, jobs: Sequence[FrameJob], device: Processor) -> None:
+    def __init__(self, device: Processor) -> None:
         self._device, self._pictures = device, dict[Path, Array]()
-        self._camera = jobs[0].frame.camera(jobs[0].base) if jobs else None
+        self._camera: Camera | None = None
         self._ready: tuple[BatchCamera, DeviceLight | ProcessorLight, float] | None = None
+        self.at_once = 1
+        """Frames of the next batch: one makes the camera ready, then as many as memory holds."""
 
     def outcomes(self, jobs: Sequence[FrameJob]) -> Iterator[Outcome]:
         """Yield the outcomes of a batch."""
         start = time.perf_counter()
-        assert self._camera is not None
+        if self._camera is None:
+            self._camera = jobs[0].frame.camera(jobs[0].base)
         views: dict[str, int] = {}
         crops, shown = list[Array](), list[int]()
         for job in jobs:
@@ -109,8 +120,8 @@ class _Batched:
             shown.append(views[view])
         stack = self._device.stacked(crops)
         if self._ready is None:
-            self._ready = ready(solved_for(self._camera), stack.shape[1:], self._device)
-            _refuse_timed(self._ready[0])
+            self._make_ready(self._camera, stack.shape[1:])
+        assert self._ready is not None
         taker, light, white = self._ready
         rates = light.rates(linear_pictures(stack, self._device, self._camera))
         kept = defaultdict[float, list[tuple[int, float]]](list)
@@ -134,6 +145,17 @@ class _Batched:
             for raw, plain, (number, seconds) in pairs:
                 yield _outcome(jobs[number], taker, raw, plain, seconds, gain, spent)
 
+    def _make_ready(self, camera: Camera, shape: tuple[int, ...]) -> None:
+        """Make the camera ready for pictures of a shape, and choose how many are at once."""
+        solved = solved_for(camera)
+        if names := timed_effects(solved):
+            message = f"{', '.join(names)}: the light depends on the exposure time"
+            raise CannotDo(message, "use --device cpu")
+        taker, light, _ = self._ready = ready(solved, shape, self._device)
+        each = frame_bytes(taker) + light.bytes_per_picture(shape[-1])
+        require(self._device, each, "a frame")
+        self.at_once = min(BATCH, self._device.free_memory() // each)
+
     def _crop(self, job: FrameJob) -> Array:
         """Return the part of a picture that a frame shows; the last pictures are kept."""
         from vcam_cli.files.images.images import read_picture
@@ -153,16 +175,6 @@ class _Batched:
 
 def _seconds(given: Any) -> float:
     return float(given) if isinstance(given, int | float) else parse(given, "time")
-
-
-def _refuse_timed(taker: BatchCamera) -> None:
-    """Raise CannotDo for light that depends on the exposure time."""
-    effects = taker.solved.effects.enabled
-    timed = [*of_kind(effects, TemporalGain, Transport)]
-    timed += of_kind(effects, ImageMotion)
-    if timed:
-        names = ", ".join(effect.name for effect in timed)
-        raise CannotDo(f"{names}: the light depends on the exposure time", "use --device cpu")
 
 
 def _outcome(

@@ -163,7 +163,10 @@ class Processor:
         planes = np.zeros((len(pictures), len(mix), *shape), pictures.dtype)
         height, width = pictures.shape[1:3]
         inside = (slice(black[0], black[0] + height), slice(black[1], black[1] + width))
-        planes[:, :, *inside] = np.einsum("mk,nyxk->nmyx", mix, pictures)
+        # Channel by channel: the same sums however many pictures there are.
+        for number, weights in enumerate(mix):
+            for channel in np.flatnonzero(weights):
+                planes[:, number, *inside] += weights[channel] * pictures[..., channel]
         found: Array = scipy.fft.dctn(planes, type=2, axes=(-2, -1), overwrite_x=True)
         return found
 

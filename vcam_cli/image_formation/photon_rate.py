@@ -278,6 +278,7 @@ def on_mosaics(
         the axis, and glares between them.
     """
     centers: list[Array] = [axis.astype(dtype) for axis in pixel_centers(path.geometry)]
+    x, y = centers
     glares, gains = _glares_and_gains(path.effects)
     found: list[Callable[[Array], object]] = []
     for number, group in enumerate(gains):
@@ -285,10 +286,10 @@ def on_mosaics(
             glare = glares[number - 1]
             found.append(partial(spread_over_mosaic, mosaic=path.mosaic, glare=glare))
         if group:
-            product: Array = np.ones((1, *map(len, centers[::-1])), dtype)
+            product: Array = np.ones((1, path.geometry.rows, path.geometry.columns), dtype)
             for gain in group:
-                scale = 1 / (gain.on_axis or 1.0)
-                _attenuate(product, gain, (centers[0], centers[1]), path.mosaic, 0, scale)
+                scale = product.dtype.type(1 / (gain.on_axis or 1.0))
+                _attenuate(product, gain, (x, y), path.mosaic, 0, scale)
             found.append(partial(_scale, factor=put(product[0])))
     return tuple(found)
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TypeVar
 
 import numpy as np
 
@@ -26,22 +25,21 @@ from vcam_cli.effects.signal_chain import (
 from vcam_cli.parallel import each, slices_within
 from vcam_cli.rng import BLOCK_ROWS, blocks, stream
 
-Time = TypeVar("Time", float, Array)
 AT_ONCE = 1 << 16
 """Pixels that flow together, about: a draw is made for them in the same order as for more."""
 LAYER = 32
 """Bits of a block's number: those above are the layer's of stacked pixels."""
 
 
-def mean_electrons(rate: Array, time: Time, effects: tuple[Effect, ...]) -> Array:
+def mean_electrons(rate: Array, time: float, effects: tuple[Effect, ...]) -> Array:
     """Return the noise-free signal before saturation, photo-electrons and dark current.
 
     Parameters
     ----------
     rate : Array
         Photo-electrons per second, of any shape [e/s].
-    time : float or Array
-        Exposure time, or those of frames (B, 1, 1) in the float type of `rate` [s].
+    time : float
+        Exposure time [s].
     effects : tuple of Effect
         Effects of the camera; those of kind Charge are used.
 
@@ -50,30 +48,27 @@ def mean_electrons(rate: Array, time: Time, effects: tuple[Effect, ...]) -> Arra
     Array
         Mean signal in the shape and float type of `rate` [electrons].
     """
-    dark: float | Array = mean_dark(time, effects)
-    if getattr(time, "ndim", 0) == 0:
-        time, dark = rate.dtype.type(time), rate.dtype.type(dark)
-    signal: Array = rate * time + dark
+    signal: Array = rate * rate.dtype.type(time) + rate.dtype.type(mean_dark(time, effects))
     return signal
 
 
-def mean_dark(time: Time, effects: tuple[Effect, ...]) -> Time:
+def mean_dark(time: float, effects: tuple[Effect, ...]) -> float:
     """Return the mean dark signal of a pixel.
 
     Parameters
     ----------
-    time : float or Array
-        Exposure time, or those of frames [s].
+    time : float
+        Exposure time [s].
     effects : tuple of Effect
         Effects of the camera; those of kind Charge are used.
 
     Returns
     -------
-    float or Array
-        Mean dark signal, one for each time [electrons].
+    float
+        Mean dark signal [electrons].
     """
     charges = of_kind(effects, Charge)
-    return time * float(sum(charge.rate() for charge in charges))
+    return time * sum(charge.rate() for charge in charges)
 
 
 def sites(
@@ -326,7 +321,7 @@ def codes(
 
 
 def mean_charge(
-    rate: Array, time: Time, effects: tuple[Effect, ...], here: Mapping[str, Site]
+    rate: Array, time: float, effects: tuple[Effect, ...], here: Mapping[str, Site]
 ) -> Array:
     """Return the mean signal whose shot noise is drawn.
 
@@ -334,8 +329,8 @@ def mean_charge(
     ----------
     rate : Array
         Photo-electrons per second (..., rows, columns) [e/s].
-    time : float or Array
-        Exposure time, or those of frames (B, 1, 1) [s].
+    time : float
+        Exposure time [s].
     effects : tuple of Effect
         Effects that run, in the order of action.
     here : mapping
