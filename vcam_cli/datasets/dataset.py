@@ -16,9 +16,9 @@ from typing import Any
 
 from vcam_cli.datasets import manifest
 from vcam_cli.datasets.dataset_file import DatasetFile
-from vcam_cli.datasets.device_frames import batches_of, compute_batches
+from vcam_cli.datasets.device_frames import BATCH, batch_key
 from vcam_cli.datasets.drawing import Frame
-from vcam_cli.datasets.frame_work import NPZ, FrameJob
+from vcam_cli.datasets.frame_work import NPZ, FrameJob, device_outcomes
 from vcam_cli.datasets.shards import Packer, Shard, scale, shards
 from vcam_cli.devices.choice import open_device
 from vcam_cli.errors import bad
@@ -219,13 +219,20 @@ def _compute_on_device(
 ) -> int:
     """Compute frames in batches on a device, and those that batches do not compute one by one."""
     device = open_device(execution.device)
-    cameras, others = batches_of(groups)
-    total, computed = sum(len(jobs) for jobs in cameras), 0
-    for jobs in cameras:
-        for outcome in compute_batches(jobs, device, lambda job: points.ask(job) == "compute"):
-            points.keep(outcome)
-            computed += 1
-            watch.step(computed, total)
+    cameras: dict[str, list[FrameJob]] = defaultdict(list)
+    others: list[FrameJob] = []
+    for job in (job for group in groups for job in group):
+        key = batch_key(job.frame, job.write)
+        (others if key is None else cameras[key]).append(job)
+    total, computed = sum(len(jobs) for jobs in cameras.values()), 0
+    for jobs in cameras.values():
+        for start in range(0, len(jobs), BATCH):
+            batch = jobs[start : start + BATCH]
+            wanted = [job for job in batch if points.ask(job) == "compute"]
+            for outcome in device_outcomes(wanted, device) if wanted else ():
+                points.keep(outcome)
+                computed += 1
+                watch.step(computed, total)
     if others:
         tell(f"{len(others)} frames take their light from the processor, one by one")
         computed += compute([others], points, execution, watch, tell, "frames")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,9 +11,12 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.config.document import Document
+from vcam_cli.datasets.device_frames import device_frames
 from vcam_cli.datasets.drawing import Frame
+from vcam_cli.devices.processor import Processor
 from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.signal_chain import NoiseSource
+from vcam_cli.errors import BadInput, CannotDo
 from vcam_cli.files.frame_archive import archive_bytes
 from vcam_cli.image_formation.rate_cache import RateCache
 from vcam_cli.quality.photon_transfer import ROUNDING
@@ -22,6 +26,7 @@ from vcam_cli.simulation.shared import Shared
 from vcam_cli.simulation.simulate import Result, simulate
 from vcam_cli.solve.solved import Solved
 from vcam_cli.sweeps.point_effects import with_every_effect
+from vcam_cli.sweeps.sweep_result import Outcome, error_cell
 
 LIGHT = 1 << 24
 """Bytes of light that are kept: no frame comes back to the scene of an earlier one."""
@@ -64,6 +69,35 @@ class FrameJob:
         return labels(result), {NPZ: archive_bytes(arrays)}
 
 
+def device_outcomes(jobs: Sequence[FrameJob], device: Processor) -> Iterator[Outcome]:
+    """Yield the outcomes of frames of one `batch_key`, as a device takes them.
+
+    Parameters
+    ----------
+    jobs : sequence of FrameJob
+        The frames.
+    device : Processor
+        Where they are computed.
+    """
+    left = {job.frame.number: job for job in jobs}
+    error, final = "", True
+    start = time.perf_counter()
+    try:
+        batched = device_frames(jobs[0].frame, jobs[0].write, jobs[0].base, device)
+        for frame, taker, raw, clean, seconds, gain in batched.take([job.frame for job in jobs]):
+            job, camera = left.pop(frame.number), taker.at_gain(gain)
+            arrays = {"raw": raw, "clean": clean}
+            archive = archive_bytes({kind: arrays[kind] for kind in job.write})
+            told = noise_labels(camera.solved, camera.chain, camera.effects, seconds, raw)
+            spent = (time.perf_counter() - start) / len(jobs)
+            yield Outcome(job.id, told, seconds=spent, frames={NPZ: archive})
+    except BadInput as problem:
+        error = error_cell(problem.problems)
+    except CannotDo as problem:
+        error, final = str(problem), False
+    yield from (Outcome(job.id, error=error, final=final) for job in left.values())
+
+
 def labels(result: Result) -> dict[str, float]:
     """Return what a noise model says of a frame, by the columns of the manifest.
 
@@ -77,17 +111,17 @@ def labels(result: Result) -> dict[str, float]:
 
 
 def noise_labels(
-    solved: Solved, chain: ReadoutChain, effects: tuple[Effect, ...], time: float, dn: Array
+    solved: Solved, chain: ReadoutChain, effects: tuple[Effect, ...], seconds: float, dn: Array
 ) -> dict[str, float]:
-    """Return the labels of a frame that a camera at its gain took in a time [s]; dn: its codes."""
+    """Return the labels of a frame: a camera at its gain, exposure time [s], its codes dn."""
     circuit, gain = solved.electrical, chain.system_gain
-    dark = mean_dark(time, effects)
+    dark = mean_dark(seconds, effects)
     sources = of_kind(effects, NoiseSource)
     rms = {f"{source.name} [e]": source.variance(dark, dark) ** 0.5 for source in sources}
     temporal = sum(s.variance(dark, dark) for s in sources if s.scope == "frame")
     fpn = solved.pixel.fpn
     return {
-        "exposure_time [s]": time,
+        "exposure_time [s]": seconds,
         "exposure_gain": circuit.exposure_gain,
         "system_gain [DN/e]": gain,
         "black_level [DN]": chain.black_dn(dark),
