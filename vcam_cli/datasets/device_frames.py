@@ -190,7 +190,7 @@ def device_frames(
 
 
 def _seconds(given: Any, other: float) -> float:
-    """Return an exposure time as YAML has it [s]; another one where there is none."""
+    """Return an exposure time as YAML has it [s]; `other` for None."""
     if given is None:
         return other
     return float(given) if isinstance(given, int | float) else parse(given, "time")
