@@ -234,7 +234,7 @@ def _compute_on_device(
                 computed += 1
                 watch.step(computed, total)
     if others:
-        tell(f"{len(others)} frames take their light from the processor, one by one")
+        tell("frames take their light from the processor, one by one")
         computed += compute([others], points, execution, watch, tell, "frames")
     return computed
 

@@ -52,17 +52,18 @@ def _transfer(image_filter: Filter, dtype: type) -> Array:
     out: Array = np.zeros((*image_filter.tables.shape, *counts), dtype)
     weights, period_x, period_y = _fold_weights(x), _distinguished(x), _distinguished(y)
     for mixture, color, terms, factors in image_filter.factors():
-        width = factors.shape[1]
+        width = factors.shape[-1]
         factors *= weights[:width]
-        merged = factors[:, :period_x]
+        merged = factors[..., :period_x]
         if width > period_x:
-            merged = np.zeros((len(factors), period_x))
+            merged = np.zeros((*factors.shape[:-1], period_x))
             for target, source, _ in segments(period_x, width):
-                merged[:, target] += factors[:, source]
+                merged[..., target] += factors[..., source]
         rest = terms % (2 * period_y)
         rows = np.minimum(rest, 2 * period_y - rest)
         kept = rows < period_y
-        out[mixture, color, rows[kept], : merged.shape[1]] += merged[kept]
+        of_color = out[mixture, color]
+        of_color[..., rows[kept], : merged.shape[-1]] += merged[..., kept, :]
     return out
 
 
