@@ -283,7 +283,8 @@ def asks_for_an_effects_kind(module: Module) -> list[str]:
 BEHIND_SOLVE = {"image_formation", "readout", "processing", "quality", "simulation"}
 """Packages behind `solve`."""
 READS_CAMERAS = {
-    "simulation.simulate", "simulation.pipeline", "simulation.reading", "simulation.shared",
+    "simulation.simulate", "simulation.exposures", "simulation.pipeline", "simulation.reading",
+    "simulation.shared",
     "simulation.planned", "simulation.sequence", "simulation.exposure_control",
     "simulation.scene_times", "simulation.bracket",  # who simulates a camera
     "simulation.checks", "simulation.scene_files", "simulation.spectral_irradiance",

@@ -22,8 +22,10 @@ from vcam_cli import load, simulate
 from vcam_cli.commands.main import app
 from vcam_cli.datasets import dataset_file
 from vcam_cli.datasets.dataset import dataset
+from vcam_cli.datasets.parts import Hasher, cut
 from vcam_cli.errors import BadInput
 from vcam_cli.files.images.png import write_png
+from vcam_cli.progress import Silent
 from vcam_cli.sweeps.execution import Execution, Share
 
 STUDY = {
@@ -166,31 +168,77 @@ def test_labels_are_the_moments_of_the_noise(tmp_path):
             assert raw.var() == pytest.approx(variance, rel=5 * np.sqrt(2) / 160)
 
 
-def test_workers_kills_and_order_change_no_byte(whole, tmp_path):
-    """Two workers, killed as soon as three frames are there; then again, to the end."""
-    study, out = whole
+@pytest.fixture(scope="module")
+def many(tmp_path_factory):
+    """A data set of four parts in two shards."""
+    folder = tmp_path_factory.mktemp("many")
+    study = written(folder, frames=150, shards=2, write=["raw", "clean"])
+    sizes = [len(job) for job in parts_of(study)]
+    assert len(sizes) == 4
+    assert sum(sizes) == 150
+    assert made(study, folder / "out").computed == 150
+    return study, folder / "out"
+
+
+def parts_of(study):
+    """The numbers of the frames of every part."""
+    file = dataset_file.read(study)
+    return [part.numbers for shard in cut(file, Hasher(file)) for part in shard.parts]
+
+
+def test_every_frame_is_in_one_part_beside_those_of_its_light(tmp_path):
+    """Of shards that cut scenes in two, large frames and charts, with and without end."""
+    for changes in (
+        {"frames": 100, "shards": 7},
+        {"frames": 9, "shards": 1, "size": {"rows": 60, "columns": 70}},
+        {"frames": 200, "shards": 1, "scenes": {"charts": ["csf", "uniform"], "frames_each": 90}},
+    ):
+        found = parts_of(written(tmp_path, **changes))
+        assert sorted(number for part in found for number in part) == [*range(changes["frames"])]
+        assert max(map(len, found)) <= 64
+
+
+def test_workers_kills_and_order_change_no_byte(many, tmp_path):
+    """Two workers, killed as soon as a part is there; then again, to the end."""
+    study, out = many
     command = [*VCAM, "dataset", str(study), "-o", str(tmp_path / "out"), "--workers", "2", "-q"]
     process = subprocess.Popen(command, env=environment())
     points = tmp_path / "out" / "points"
     deadline = time.monotonic() + 120
-    while len(list(points.glob("*.json"))) < 3 and process.poll() is None:
+    while not list(points.glob("*.json")) and process.poll() is None:
         assert time.monotonic() < deadline
         time.sleep(0.002)
     process.send_signal(signal.SIGKILL)
     process.wait()
     assert not (tmp_path / "out" / "manifest.csv").exists()
     result = made(study, tmp_path / "out", workers=2)
-    assert 0 < result.computed <= 7
+    assert 0 < result.computed < 150
     assert contents(tmp_path / "out") == contents(out)
     assert not list(points.glob("*.npz"))
     assert made(study, tmp_path / "out").computed == 0
 
 
+def test_a_shard_is_packed_with_its_last_part(many, tmp_path):
+    """A progress bar looks at the folder: of the first shard no part is left when it is whole."""
+    study, out = many
+    seen = []
+
+    class Watch(Silent):
+        def step(self, done, total):
+            shards = len(list((tmp_path / "out").glob("*.npz")))
+            seen.append((shards, len(list((tmp_path / "out" / "points").glob("*.npz")))))
+
+    dataset(dataset_file.read(study), tmp_path / "out", Execution(workers=1), Watch())
+    assert max(parts for _, parts in seen) <= 2
+    assert {shards for shards, _ in seen} == {0, 1, 2}
+    assert contents(tmp_path / "out") == contents(out)
+
+
 @pytest.mark.long
-def test_a_cluster_changes_no_byte(whole, tmp_path):
-    """Two workers of a Dask scheduler, one of which is killed as soon as three frames are there."""
+def test_a_cluster_changes_no_byte(many, tmp_path):
+    """Two workers of a Dask scheduler, one of which is killed as soon as a part is there."""
     pytest.importorskip("distributed")
-    study, out = whole
+    study, out = many
     cluster = Cluster(tmp_path)
     try:
         cluster.add_worker()
@@ -202,13 +250,13 @@ def test_a_cluster_changes_no_byte(whole, tmp_path):
         )  # fmt: skip
         points = tmp_path / "out" / "points"
         deadline = time.monotonic() + 60
-        while len(list(points.glob("*.json"))) < 3 and process.poll() is None:
+        while not list(points.glob("*.json")) and process.poll() is None:
             assert time.monotonic() < deadline
             time.sleep(0.002)
         cluster.workers[0].kill()
         told, said = process.communicate(timeout=120)
         assert process.returncode == 0, said
-        assert json.loads(told)["computed"] == 10
+        assert json.loads(told)["computed"] == 150
         assert contents(tmp_path / "out") == contents(out)
         assert not list(points.glob("*.npz"))
     finally:
@@ -393,6 +441,7 @@ import resource, sys
 from pathlib import Path
 from vcam_cli.datasets import dataset_file
 from vcam_cli.datasets.dataset import dataset
+from vcam_cli.datasets.parts import Hasher, cut
 from vcam_cli.sweeps.execution import Execution
 dataset(dataset_file.read(sys.argv[1]), Path(sys.argv[2]), Execution(workers=1))
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)

@@ -10,6 +10,7 @@ from vcam_cli.image_formation.light_plan import LightPlan
 from vcam_cli.image_formation.optical_path import SpectrumReport
 from vcam_cli.image_formation.photon_rate import Rate
 from vcam_cli.image_formation.rate_cache import RateCache
+from vcam_cli.physics.cache import ByteCache
 from vcam_cli.simulation import scene_light
 from vcam_cli.simulation.shared import KEPT, RECENT, Shared
 from vcam_cli.solve.light_key import INDEPENDENT_KEYS, light_key
@@ -242,7 +243,7 @@ def test_what_is_kept_by_default_is_bounded(tmp_path):
 def test_a_picture_beyond_the_bound_is_not_kept(tmp_path):
     made = camera(tmp_path, BASE)
     for size, reads in ((100, 1), (101, 2)):
-        shared, found = Shared(largest_picture=100), []
+        shared, found = Shared(pictures=ByteCache(100, strict=True)), []
 
         def read(size=size, found=found):
             found.append(size)

@@ -35,7 +35,7 @@ from vcam_cli.camera.sensor.array import Array
 from vcam_cli.camera.sensor.pixel import Pixel
 from vcam_cli.camera.sensor.several_readouts import ONE_READOUT
 from vcam_cli.camera.simulation import ACCURACY, Accuracy, Effects, Output, Seed
-from vcam_cli.config.model import FileModel, key
+from vcam_cli.config.model import FileModel, Model, key
 from vcam_cli.config.validation_messages import failure, fault
 from vcam_cli.config.values import Word
 from vcam_cli.errors import BadInput, Problem
@@ -97,7 +97,11 @@ class CameraModel(FileModel):
     _exposure_gain: float | None = PrivateAttr(default=None)
 
     @model_validator(mode="after")
-    def _agrees(self) -> Self:
+    def _sections_agree(self) -> Self:
+        return self._agreeing()
+
+    def _agreeing(self) -> Self:
+        """Return the camera while it is built: its defaults filled in, its sections checked."""
         array, colors = self.array, len(self.array.colors)
         if "processing" not in self.model_fields_set:
             emits = self.scene.emits
@@ -297,6 +301,20 @@ class CameraModel(FileModel):
         """
         camera = self.model_copy()
         camera._samples = tuple(samples.items())
+        return camera
+
+    def with_sections(self, sections: Mapping[str, Model]) -> Self:
+        """Return the same camera with other sections, checked against the rest of it.
+
+        Raises ValidationError.
+        """
+        camera = self.model_copy(update=dict(sections))
+        return camera._agreeing()
+
+    def before_scene_of(self, other: Self) -> Self:
+        """Return the same camera before another one's scene, with its lens and all its files."""
+        camera = self.model_copy(update={"scene": other.scene, "optics": other.optics})
+        camera._samples = other._samples
         return camera
 
     def samples(self, path: str) -> Any:

@@ -1,5 +1,6 @@
 """The steps that `processing` may have: a model for each, of one key, the step's name."""
 
+from functools import cache
 from typing import Annotated, Any, ClassVar, Literal
 
 from vcam_cli.config.model import Model, key
@@ -19,12 +20,18 @@ class Step(Model):
     @property
     def name(self) -> str:
         """Name of the step."""
-        return next(iter(type(self).model_fields))
+        return _step_name(type(self))
 
     @property
     def value(self) -> Any:
         """What the file says of it."""
         return getattr(self, self.name)
+
+
+@cache
+def _step_name(step: type[Step]) -> str:
+    """Return the name of a step; a check of a camera asks fifty times."""
+    return next(iter(step.model_fields))
 
 
 _DN = Quantity("dn", least=0, words={"subtract": "subtract", "none": "none"})

@@ -53,7 +53,7 @@ class Document(Generic[M]):
         `checks` are further ones than those of the format.
         """
         findings = self._findings()
-        tree, data = _with_absolute_files(self._with_name(), self.format.file_keys, findings)
+        tree, data = absolute_files(self._with_name(), self.format.file_keys, findings)
         origin = Origin(self.file, tuple(dict.fromkeys((*self.files, *data))), tree, self.files)
         model, wrong = _validate(tree, self.format, origin, findings)
         for check, sections in (*self.format.checks, *checks):
@@ -69,7 +69,7 @@ class Document(Generic[M]):
     @property
     def inputs(self) -> tuple[Path, ...]:
         """YAML files that went into it and data files that these name, of those there are."""
-        _, data = _with_absolute_files(self.tree, self.format.file_keys, Findings())
+        _, data = absolute_files(self.tree, self.format.file_keys, Findings())
         return tuple(dict.fromkeys((*self.files, *data)))
 
     def _findings(self) -> Findings:
@@ -121,10 +121,8 @@ def _document(file: Path, tree: Node, reader: PartReader[M]) -> Document[M]:
     return Document(file, tree, reader.format, files, problems, frozenset(found.failed))
 
 
-def _with_absolute_files(
-    tree: Node, keys: frozenset[Key], findings: Findings
-) -> tuple[Node, list[Path]]:
-    """Return the tree with every data file's name absolute, and the files."""
+def absolute_files(tree: Node, keys: frozenset[Key], findings: Findings) -> tuple[Node, list[Path]]:
+    """Return the tree with every data file's name absolute, and the files; note what is wrong."""
     files: list[Path] = []
 
     def visit(node: Node, path: errors.Path, kind: object = None) -> Node:

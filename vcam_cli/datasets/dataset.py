@@ -1,36 +1,34 @@
 """A data set from its file to its shards: what `vcam dataset` does.
 
-Frames are computed by the workers of sweeps, and kept one by one as points are; then they are
-packed. What is written depends on the file alone, not on who computed it or how often it stopped.
+Parts of a shard are computed by the workers of sweeps, and kept one by one as points are; a shard
+is packed as soon as its parts are there. What is written depends on the file alone, not on who
+computed it or how often it stopped.
 """
 
 from __future__ import annotations
 
 import time
-from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 from vcam_cli.datasets import manifest
 from vcam_cli.datasets.dataset_file import DatasetFile
-from vcam_cli.datasets.device_frames import BATCH, batch_key
-from vcam_cli.datasets.drawing import Frame
-from vcam_cli.datasets.frame_work import NPZ, FrameJob, device_outcomes
-from vcam_cli.datasets.shards import Packer, Shard, scale, shards
-from vcam_cli.devices.choice import open_device
+from vcam_cli.datasets.frame_work import NPZ, FramesJob
+from vcam_cli.datasets.parts import Hasher, cut
+from vcam_cli.datasets.shards import Packer, Part, Shard, scale
 from vcam_cli.errors import bad
 from vcam_cli.files.points_store import SweepFolder
 from vcam_cli.files.records import Fingerprint
-from vcam_cli.files.report import hash_file, hash_text, to_json
+from vcam_cli.files.report import hash_text, to_json
 from vcam_cli.progress import Observer, Silent
 from vcam_cli.simulation.output import provenance
 from vcam_cli.sweeps.execution import Execution
 from vcam_cli.sweeps.point_execution import claim_point, compute, keep_outcome
 from vcam_cli.sweeps.point_work import Task
-from vcam_cli.sweeps.sweep_points import LIBRARIES, hash_of
+from vcam_cli.sweeps.sweep_points import LIBRARIES
 from vcam_cli.sweeps.sweep_result import Outcome, read_outcome
 from vcam_cli.sweeps.workers import Verdict
 
@@ -79,59 +77,37 @@ def dataset(
     watch, tell = watch or Silent(), tell or (lambda _: None)
     watch.begin("frames")
     versions = {name: found for name, found in provenance.versions().items() if name in LIBRARIES}
-    ids = frame_ids(file, execution.device)
-    whole = shards(file.model.frames, file.model.shards, ids)
+    whole = cut(file, Hasher(file))
     mine = _of_share(whole, execution)
     with SweepFolder(out, RECORD) as folder:
-        former = folder.begin({"name": file.model.name}, hash_text(to_json(ids)))
+        asked = hash_text(to_json([shard.ids for shard in whole]))
+        former = folder.begin({"name": file.model.name}, asked)
         packer = Packer(folder, file.model.format, _scale(file), former)
-        points = _Frames(folder, execution.fresh, versions["code"])
-        for shard in mine:
-            if not execution.fresh and packer.files(shard) is not None:
-                points.packed.update(shard.ids)
-        groups = _groups(file, mine, ids, points, versions, execution.device)
-        if execution.device == "cpu":
-            computed = compute(groups, points, execution, watch, tell, "frames")
-        else:
-            computed = _compute_on_device(groups, points, execution, watch, tell)
+        parts = _Parts(folder, packer, whole, execution.fresh, versions["code"])
+        left = [shard for shard in mine if not parts.is_packed(shard)]
+        groups = [group for shard in left for group in _groups(file, shard, versions)]
+        sizes = {part.id: len(part.numbers) for shard in left for part in shard.parts}
+        computed = compute(groups, parts, execution, watch, tell, "frames", sizes)
         with folder.summarizing():
-            found, there = _pack_all(packer, points, whole)
-            record = _record(file, versions, execution.device) | {"packed": len(found)}
-            table = partial(manifest.write, file, packer, found)
+            packed = [(shard, parts.pack(shard)) for shard in whole]
+            found = [shard for shard, files in packed if files is not None]
+            there = {name: made for _, files in packed for name, made in (files or {}).items()}
+            record = _record(file, versions) | {"packed": len(found)}
+            known = manifest.packed(packer, found)
+            table = partial(manifest.write, file, packer, known)
             folder.finish({MANIFEST: table}, record, file.inputs, there=there)
-            failed = manifest.failures(packer, found) + len(points.unfinished)
-    done = sum(len(shard.ids) for shard in found)
+            unfinished = sum(sizes[part] for part in parts.unfinished)
+    done = sum(len(shard.frames) for shard in found)
     return DatasetResult(
         name=file.model.name,
         out=out,
-        frames=len(ids),
+        frames=file.model.frames,
         computed=computed,
-        failed=failed,
-        missing=len(ids) - done - len(points.unfinished),
+        failed=known.failed + unfinished,
+        missing=file.model.frames - done - unfinished,
         shards=len(found),
         seconds=time.perf_counter() - start,
     )
-
-
-def frame_ids(file: DatasetFile, device: str = "cpu") -> list[str]:
-    """Return the hash of every frame: of all that its arrays depend on, wherever files lie."""
-    form = file.camera.model_dump(mode="json")
-    for name in ("name", "quality", "expect", "output", "seed"):
-        form.pop(name, None)
-    form["sensor"] = file.camera.seed.sensor
-    asked = {"write": sorted(file.model.write)} | ({} if device == "cpu" else {"device": device})
-    content = hash_of(file.camera, form, asked)
-    hashes = {s.file: hash_file(s.file) for s in file.scenes if s.file is not None}
-
-    def plain(frame: Frame) -> dict[str, Any]:
-        scene = frame.scene
-        shown = None if scene is None else hashes[scene.file] if scene.file else scene.source
-        return frame.plain | {"scene": shown}
-
-    return [
-        hash_text(f"{content} {to_json(plain(file.frame(n)))}")[:32]
-        for n in range(file.model.frames)
-    ]
 
 
 def _scale(file: DatasetFile) -> int:
@@ -150,113 +126,126 @@ def _of_share(whole: list[Shard], execution: Execution) -> list[Shard]:
     return whole[share.number - 1 :: share.count]
 
 
-class _Frames:
-    """The frames to compute, and their records."""
+class _Parts:
+    """The parts to compute, and their records; shards are packed when theirs are there."""
 
-    def __init__(self, folder: SweepFolder, fresh: bool, code: str) -> None:
-        self._folder, self._fresh, self._code = folder, fresh, code
-        self.packed: set[str] = set()
-        self.computed: set[str] = set()
+    def __init__(
+        self, folder: SweepFolder, packer: Packer, shards: Sequence[Shard], fresh: bool, code: str
+    ) -> None:
+        self._folder, self._packer, self._fresh, self._code = folder, packer, fresh, code
+        self._shards = {part.id: shard for shard in shards for part in shard.parts}
+        self._left = {shard.number: {part.id for part in shard.parts} for shard in shards}
+        """Number of a shard -> its parts that are not known to be there."""
+        self._computed: set[str] = set()
         self.unfinished: set[str] = set()
         """Those that failed, and might not another time."""
 
     def ask(self, job: Task) -> Verdict:
-        """Return whether a frame is still to be computed, and claim it then."""
-        return claim_point(self._folder, job.id, lambda: self.is_finished(job.id))
-
-    def is_finished(self, point: str) -> bool:
-        """Return whether a frame is there, or failed as it would again."""
-        if self._fresh and point not in self.computed:
-            return False
-        content = self._folder.read(point)
-        try:
-            outcome = None if content is None else read_outcome(point, content)
-        except ValueError:
-            return False
-        if outcome is None or not outcome.final:
-            return False
-        return bool(outcome.error) or self._folder.read(point, (NPZ,)) is not None
-
-    def is_there(self, point: str) -> bool:
-        """Return whether a frame can be packed; one computed now is not read for that."""
-        return point in self.computed - self.unfinished or self.is_finished(point)
+        """Return whether a part is still to be computed, and claim it then."""
+        verdict = claim_point(self._folder, job.id, lambda: self._is_finished(job.id))
+        if verdict == "finished":
+            self._note(job.id)
+        return verdict
 
     def keep(self, outcome: Outcome) -> None:
-        """Keep the outcome of a frame."""
+        """Keep the outcome of a part, and pack its shard with the last one."""
         found = keep_outcome(self._folder, outcome, self._code)
-        self.computed.add(outcome.id)
-        if not found.final:
+        self._computed.add(outcome.id)
+        if found.final and not found.error:
+            self._note(outcome.id)
+        else:
             self.unfinished.add(outcome.id)
 
+    def is_packed(self, shard: Shard) -> bool:
+        """Return whether a shard is packed, and need not be computed again."""
+        return not self._fresh and self._packer.files(shard) is not None
 
-def _groups(
-    file: DatasetFile,
-    mine: list[Shard],
-    ids: list[str],
-    points: _Frames,
-    versions: dict[str, str],
-    device: str,
-) -> list[list[FrameJob]]:
-    """Return the frames that are not packed; those of one picture together, it is read once."""
-    groups: dict[Any, list[FrameJob]] = defaultdict(list)
-    for shard in mine:
-        for number in shard.frames:
-            if ids[number] in points.packed:
-                continue
-            frame = file.frame(number)
-            scene = None if frame.scene is None else (frame.scene.name, str(frame.scene.file))
-            job = FrameJob(ids[number], frame, file.base, file.model.write, versions, device)
-            groups[scene].append(job)
-    return list(groups.values())
+    def pack(self, shard: Shard) -> dict[str, Fingerprint] | None:
+        """Return the files of a shard, packed now where all of its parts are there.
 
+        None where it is not packed. The caller is alone to do so: `SweepFolder.summarizing`.
+        """
+        if all(self._is_there(part) for part in shard.parts):
+            return self._packer.pack(shard)
+        return self._packer.files(shard)
 
-def _compute_on_device(
-    groups: list[list[FrameJob]],
-    points: _Frames,
-    execution: Execution,
-    watch: Observer,
-    tell: Callable[[str], None],
-) -> int:
-    """Compute frames in batches on a device, and those that batches do not compute one by one."""
-    device = open_device(execution.device)
-    cameras: dict[str, list[FrameJob]] = defaultdict(list)
-    others: list[FrameJob] = []
-    for job in (job for group in groups for job in group):
-        key = batch_key(job.frame, job.write)
-        (others if key is None else cameras[key]).append(job)
-    total, computed = sum(len(jobs) for jobs in cameras.values()), 0
-    for jobs in cameras.values():
-        for start in range(0, len(jobs), BATCH):
-            batch = jobs[start : start + BATCH]
-            wanted = [job for job in batch if points.ask(job) == "compute"]
-            for outcome in device_outcomes(wanted, device) if wanted else ():
-                points.keep(outcome)
-                computed += 1
-                watch.step(computed, total)
-    if others:
-        tell("frames take their light from the processor, one by one")
-        computed += compute([others], points, execution, watch, tell, "frames")
-    return computed
+    def _note(self, part: str) -> None:
+        """Note that a part is there, and pack its shard with the last one."""
+        shard = self._shards[part]
+        self._left[shard.number].discard(part)
+        if not self._left[shard.number]:
+            with self._folder.summarizing():
+                self.pack(shard)
+
+    def _is_finished(self, part: str) -> bool:
+        """Return whether a part is kept, or in a shard that another process has packed."""
+        if self._fresh and part not in self._computed:
+            return False
+        return self._is_kept(part) or self._packer.files(self._shards[part]) is not None
+
+    def _is_there(self, part: Part) -> bool:
+        """Return whether a part can be packed; one computed now is not read for that."""
+        if part.id in self.unfinished:
+            return False
+        if part.id in self._computed:
+            return self._folder.file(part.id, NPZ).exists()
+        return not self._fresh and self._is_kept(part.id)
+
+    def _is_kept(self, part: str) -> bool:
+        content = self._folder.read(part)
+        try:
+            outcome = None if content is None else read_outcome(part, content)
+        except ValueError:
+            return False
+        if outcome is None or not outcome.final or outcome.error:
+            return False
+        return self._folder.read(part, (NPZ,)) is not None
 
 
-def _pack_all(
-    packer: Packer, points: _Frames, whole: list[Shard]
-) -> tuple[list[Shard], dict[str, Fingerprint]]:
-    """Pack all shards whose frames are there; return those that are packed, and their files."""
-    found: list[Shard] = []
-    there: dict[str, Fingerprint] = {}
-    for shard in whole:
-        is_new = not points.computed.isdisjoint(shard.ids)
-        files = None if is_new else packer.files(shard)
-        if files is None and all(map(points.is_there, shard.ids)):
-            files = packer.pack(shard)
-        if files is not None:
-            found.append(shard)
-            there |= files
-    return found, there
+TOGETHER = 64
+"""Parts of a group, at most: a worker keeps to it."""
 
 
-def _record(file: DatasetFile, versions: dict[str, str], device: str) -> dict[str, Any]:
+def _groups(file: DatasetFile, shard: Shard, versions: dict[str, str]) -> list[_Group]:
+    """Return the parts of a shard; those that begin with one picture together, it is read once."""
+    found: list[_Group] = []
+    scene: Any = None
+    for part in shard.parts:
+        own = file.frame(part.numbers[0]).scene
+        if not found or own is not scene or len(found[-1].parts) == TOGETHER:
+            found.append(_Group(file, shard, versions, []))
+        found[-1].parts.append(part)
+        scene = own
+    return found
+
+
+@dataclass(frozen=True)
+class _Group(Sequence[FramesJob]):
+    """Parts of a shard, whose frames are drawn when they are asked for."""
+
+    file: DatasetFile
+    shard: Shard
+    versions: dict[str, str]
+    parts: list[Part]
+
+    def __len__(self) -> int:
+        return len(self.parts)
+
+    @overload
+    def __getitem__(self, index: int) -> FramesJob: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[FramesJob]: ...
+    def __getitem__(self, index: int | slice) -> FramesJob | list[FramesJob]:
+        if isinstance(index, slice):
+            return [self[number] for number in range(*index.indices(len(self)))]
+        part, model = self.parts[index], self.file.model
+        lit = tuple(tuple(map(self.file.frame, numbers)) for numbers in part.lit)
+        return FramesJob(
+            part.id, lit, self.shard.frames, self.file.base, model.write, self.versions
+        )
+
+
+def _record(file: DatasetFile, versions: dict[str, str]) -> dict[str, Any]:
     model = file.model
     whole = {"npz": "shard_NNNN.npz: members FRAME.KIND", "tiff": "shard_NNNN/FRAME_KIND.tif"}
     return {
@@ -270,5 +259,4 @@ def _record(file: DatasetFile, versions: dict[str, str], device: str) -> dict[st
             kind: 1 if model.format == "npz" else scale(kind, _scale(file)) for kind in model.write
         },
         "versions": versions,
-        "device": open_device(device).describe() if device != "cpu" else device,
     }

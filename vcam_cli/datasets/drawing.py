@@ -11,12 +11,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from vcam_cli import units
+from vcam_cli.arrays import Array
 from vcam_cli.camera import load as cameras
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.sections import with_sections
 from vcam_cli.config.document import Document
 from vcam_cli.config.yaml_tree import Node, Source, node_of, tree_at
 from vcam_cli.datasets.model import Dataset, Distribution
@@ -30,6 +33,8 @@ NOWHERE = Source("what is drawn", Path(), lines=False)
 """Where mistakes are said to be that have no place in a file."""
 DIGITS = 9
 """Digits of a value that is drawn."""
+MOST_TOGETHER, MOST_PIXELS = 64, 1 << 21
+"""Frames, and their pixels, that share a light at most: they are computed at once."""
 
 
 @dataclass(frozen=True)
@@ -67,20 +72,50 @@ class Frame:
         places: path -> where mistakes of its value are said to be. Raises BadInput.
         """
         drawn = Source("what is drawn", base.file.parent, lines=False)
-        tree = tree_at(("seed", "frame"), node_of(self.seed, drawn))
-        if self.scene is not None:
-            source = self.scene.source | ({"crop": self.crop} if self.crop else {})
-            tree = cameras.merge(tree, tree_at(SOURCE, node_of(source, self.scene.place)))
-        for path, value in self.values.items():
-            place = (places or {}).get(path)
-            node = node_of(value, drawn) if place is None else _placed(value, place)
-            tree = cameras.merge(tree, tree_at(split(path), node))
+        tree = _with_values(self._own(drawn), self.values, drawn, places or {})
         return base.overlay(tree).validate(CHECKS)
+
+    def camera_after(self, known: Frame, camera: Camera, base: Document[Camera]) -> Camera:
+        """Return the same camera, sooner: with what it has in common with another frame's.
+
+        Raises BadInput.
+        """
+        drawn = Source("what is drawn", base.file.parent, lines=False)
+        differ = {path for path, value in self.values.items() if known.values[path] != value}
+        sections = {"seed", *(str(split(path)[0]) for path in differ)}
+        if (self.scene, self.crop) != (known.scene, known.crop):
+            sections.add("scene")
+        values = {path: v for path, v in self.values.items() if split(path)[0] in sections}
+        try:
+            document = base.overlay(_with_values(self._own(drawn), values, drawn, {}))
+            found = with_sections(camera, document, sections, CHECKS)
+        except BadInput:  # said with the whole file
+            found = None
+        return found or self.camera(base)
+
+    def _own(self, drawn: Source) -> Node:
+        """Return the tree of its seed and scene."""
+        tree = tree_at(("seed", "frame"), node_of(self.seed, drawn))
+        if self.scene is None:
+            return tree
+        source = self.scene.source | ({"crop": self.crop} if self.crop else {})
+        return cameras.merge(tree, tree_at(SOURCE, node_of(source, self.scene.place)))
 
     @property
     def plain(self) -> dict[str, Any]:
         """All that was drawn, but for the name of the scene."""
         return {"seed": self.seed, "values": self.values, "crop": self.crop}
+
+
+def _with_values(
+    tree: Node, values: Mapping[str, Any], drawn: Source, places: Mapping[str, Node]
+) -> Node:
+    """Return a tree of a camera with values by their paths laid over it."""
+    for path, value in values.items():
+        place = places.get(path)
+        node = node_of(value, drawn) if place is None else _placed(value, place)
+        tree = cameras.merge(tree, tree_at(split(path), node))
+    return tree
 
 
 def _placed(value: Any, place: Node) -> Node:
@@ -114,9 +149,39 @@ def draw_frame(model: Dataset, scenes: tuple[Scene, ...], number: int) -> Frame:
     if not scenes:
         return Frame(number, seed, values)
     turn, place = divmod(view, len(scenes))
-    order = stream(model.seed, "dataset scenes", block=turn).permutation(len(scenes))
-    scene = scenes[order[place]]
+    scene = scenes[_order(model.seed, turn, len(scenes))[place]]
     return Frame(number, seed, values, scene, _draw_crop(model, scene, view))
+
+
+@lru_cache(2)
+def _order(seed: int, turn: int, scenes: int) -> Array:
+    """Return the order in which scenes come, each once a turn."""
+    return stream(seed, "dataset scenes", block=turn).permutation(scenes)
+
+
+def sharing_light(model: Dataset, number: int, pixels: int) -> range:
+    """Return the numbers of the frames that share the light of a frame; it is one of them.
+
+    They do not depend on how many frames the data set has, and may go beyond its last.
+
+    Parameters
+    ----------
+    model : Dataset
+        The data set.
+    number : int
+        Number of the frame, from 0.
+    pixels : int
+        Pixels of a frame.
+    """
+    most = max(1, min(MOST_TOGETHER, MOST_PIXELS // pixels))
+    each = most  # of a scene that nothing changes
+    if model.scenes is not None:
+        each = model.scenes.frames_each
+    elif any(map(changes_light, model.vary)):
+        each = 1
+    first = number - number % each
+    start = number - (number - first) % most
+    return range(start, min(start + most, first + each))
 
 
 def _draw(model: Dataset, path: str, drawn: Distribution, index: int, above: dict[str, Any]) -> Any:

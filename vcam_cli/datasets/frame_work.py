@@ -1,38 +1,39 @@
-"""Computing a frame of a data set: its arrays, and the numbers that are its labels."""
+"""Computing frames of a data set: their arrays, and the numbers that are their labels."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.config.document import Document
-from vcam_cli.datasets.device_frames import device_frames
 from vcam_cli.datasets.drawing import Frame
-from vcam_cli.devices.processor import Processor
-from vcam_cli.effects.base import Effect, of_kind
+from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.signal_chain import NoiseSource
-from vcam_cli.errors import BadInput, CannotDo
-from vcam_cli.files.frame_archive import archive_bytes
+from vcam_cli.errors import BadInput
+from vcam_cli.files.frame_archive import archive_bytes, array_hash
 from vcam_cli.image_formation.rate_cache import RateCache
+from vcam_cli.physics.cache import ByteCache
 from vcam_cli.quality.photon_transfer import ROUNDING
-from vcam_cli.readout.chain import ReadoutChain
-from vcam_cli.readout.exposure import mean_dark
+from vcam_cli.simulation.exposures import exposures, share_light
+from vcam_cli.simulation.photograph import Photograph
 from vcam_cli.simulation.shared import Shared
-from vcam_cli.simulation.simulate import Result, simulate
-from vcam_cli.solve.solved import Solved
+from vcam_cli.simulation.simulate import simulate
 from vcam_cli.sweeps.point_effects import with_every_effect
-from vcam_cli.sweeps.sweep_result import Outcome, error_cell
+from vcam_cli.sweeps.sweep_result import error_cell
 
-LIGHT = 1 << 24
-"""Bytes of light that are kept: no frame comes back to the scene of an earlier one."""
+LIGHT, PICTURES = 1 << 24, 1 << 28
+"""Bytes of light that are kept, since no frame comes back to the scene of an earlier one, and of
+pictures, since other crops of them do."""
 NPZ = "npz"
-"""The file of a frame beside its point."""
-ARRAYS: dict[str, Callable[[Result], Array]] = {
+"""The file of frames beside their point."""
+RECORDS = "records.json"
+"""Its member that is no array: what is known of the frames."""
+ARRAYS: dict[str, Callable[[Photograph], Array]] = {
     "raw": lambda result: result.dn,
     "clean": lambda result: result.clean_dn.astype(np.float32),
     "depth": lambda result: result.frame.depth().astype(np.float32),
@@ -42,97 +43,136 @@ ARRAYS: dict[str, Callable[[Result], Array]] = {
 
 
 @dataclass(frozen=True)
-class FrameJob:
-    """A frame to compute."""
+class Record:
+    """Labels and hashes of a frame, or its error."""
+
+    labels: dict[str, float] = field(default_factory=dict)
+    hashes: dict[str, str] = field(default_factory=dict)
+    """Kind of array -> SHA-256 of its values."""
+    error: str = ""
+    """Why there is no such frame; it would fail so again."""
+
+
+@dataclass(frozen=True)
+class FramesJob:
+    """Frames to compute, of one shard."""
 
     id: str
-    frame: Frame
+    lit: tuple[tuple[Frame, ...], ...]
+    """Frames that share a light, all of them, for every light."""
+    numbers: range
+    """Those of the shard: the others are not computed."""
     base: Document[Camera]
     """The data set's camera file."""
     write: tuple[str, ...]
     versions: dict[str, str]
-    device: str = "cpu"
 
     def compute(self, threads: int, shared: Shared) -> tuple[dict[str, float], dict[str, bytes]]:
-        """Return the labels of the frame, and the archive of its arrays."""
+        """Return no metrics, and the archive of the frames' arrays and records."""
         if shared.rate_cache.limit != LIGHT:
-            shared.rate_cache = RateCache(LIGHT)
-        camera = with_every_effect(self.frame.camera(self.base))
-        output = camera.output.model_copy(update={"render": None})
-        result = simulate(
-            camera.model_copy(update={"output": output, "quality": ()}),
-            threads,
-            shared=shared,
-            device=self.device,
-        )
-        arrays = {kind: ARRAYS[kind](result) for kind in self.write}
-        return labels(result), {NPZ: archive_bytes(arrays)}
+            shared.rate_cache, shared.pictures = RateCache(LIGHT), ByteCache(PICTURES)
+        arrays: dict[str, Array] = {}
+        records: dict[str, Record] = {}
+        known: list[tuple[Frame, Camera]] = []
+        for frames in self.lit:
+            wanted = [n for n, frame in enumerate(frames) if frame.number in self.numbers]
+            for frame, result in self._results(frames, wanted, known, threads, shared):
+                if isinstance(result, BadInput):
+                    records[str(frame.number)] = Record(error=error_cell(result.problems))
+                    continue
+                own = {kind: ARRAYS[kind](result) for kind in self.write}
+                hashes = {kind: array_hash(values) for kind, values in own.items()}
+                records[str(frame.number)] = Record(labels(result), hashes)
+                arrays |= {f"{frame.number}.{kind}": values for kind, values in own.items()}
+        return {}, {NPZ: archive_bytes(arrays, {RECORDS: write_records(records).encode()})}
+
+    def _results(
+        self,
+        frames: tuple[Frame, ...],
+        wanted: Sequence[int],
+        known: list[tuple[Frame, Camera]],
+        threads: int,
+        shared: Shared,
+    ) -> Iterator[tuple[Frame, Photograph | BadInput]]:
+        """Yield the wanted frames of one light as they are simulated, or why they cannot be.
+
+        known: the first frame of the last light and its camera, once there is one.
+        """
+        cameras: dict[int, Camera] = {}
+        for number, frame in enumerate(frames):
+            try:
+                if known:
+                    camera = frame.camera_after(*known[0], self.base)
+                else:
+                    camera = frame.camera(self.base)
+                if not cameras:
+                    known[:] = [(frame, camera)]
+                cameras[number] = _raw_camera(camera)
+            except BadInput as error:
+                if number in wanted:
+                    yield frame, error
+        rest = [number for number in wanted if number in cameras]
+        if rest and all(map(share_light, cameras.values())):
+            order = list(cameras)
+            places = [order.index(number) for number in rest]
+            try:
+                for result in exposures(list(cameras.values()), threads, shared, places):
+                    yield frames[rest.pop(0)], result
+            except BadInput:  # of one of them: each of the others by itself
+                pass
+        for number in rest:
+            try:
+                every = with_every_effect(cameras[number])
+                yield frames[number], simulate(every, threads, shared=shared)
+            except BadInput as error:
+                yield frames[number], error
 
 
-def device_outcomes(jobs: Sequence[FrameJob], device: Processor) -> Iterator[Outcome]:
-    """Yield the outcomes of frames of one `batch_key`, as a device takes them.
+def write_records(records: Mapping[str, Record]) -> str:
+    """Return the records of frames by their names as a text."""
+    return json.dumps({name: vars(record) for name, record in records.items()})
 
-    Parameters
-    ----------
-    jobs : sequence of FrameJob
-        The frames.
-    device : Processor
-        Where they are computed.
-    """
-    left = {job.frame.number: job for job in jobs}
-    error, final = "", True
-    start = time.perf_counter()
+
+def read_records(text: str | bytes) -> dict[str, Record]:
+    """Return the records of such a text. Raises ValueError for another one."""
     try:
-        batched = device_frames(jobs[0].frame, jobs[0].write, jobs[0].base, device)
-        for frame, taker, raw, clean, seconds, gain in batched.take([job.frame for job in jobs]):
-            job, camera = left.pop(frame.number), taker.at_gain(gain)
-            arrays = {"raw": raw, "clean": clean}
-            archive = archive_bytes({kind: arrays[kind] for kind in job.write})
-            told = noise_labels(camera.solved, camera.chain, camera.effects, seconds, raw)
-            spent = (time.perf_counter() - start) / len(jobs)
-            yield Outcome(job.id, told, seconds=spent, frames={NPZ: archive})
-    except BadInput as problem:
-        error = error_cell(problem.problems)
-    except CannotDo as problem:
-        error, final = str(problem), False
-    yield from (Outcome(job.id, error=error, final=final) for job in left.values())
+        return {name: Record(**record) for name, record in json.loads(text).items()}
+    except (TypeError, AttributeError) as error:
+        raise ValueError(str(error)) from None
 
 
-def labels(result: Result) -> dict[str, float]:
+def _raw_camera(camera: Camera) -> Camera:
+    """Return the camera without a picture."""
+    output = camera.output.model_copy(update={"render": None})
+    return camera.model_copy(update={"output": output, "quality": ()})
+
+
+def labels(result: Photograph) -> dict[str, float]:
     """Return what a noise model says of a frame, by the columns of the manifest.
 
     The temporal variance of a pixel is dark_variance + system_gain (clean - black_level), as long
     as it does not saturate and its signal chain is linear.
     """
-    frame = result.frame
-    return noise_labels(
-        frame.solved, frame.chain, frame.plan.active, frame.exposure_time, result.dn
-    )
-
-
-def noise_labels(
-    solved: Solved, chain: ReadoutChain, effects: tuple[Effect, ...], seconds: float, dn: Array
-) -> dict[str, float]:
-    """Return the labels of a frame: a camera at its gain, exposure time [s], its codes dn."""
-    circuit, gain = solved.electrical, chain.system_gain
-    dark = mean_dark(seconds, effects)
-    sources = of_kind(effects, NoiseSource)
+    frame, circuit = result.frame, result.frame.electrical
+    gain = frame.chain.system_gain
+    dark = frame.dark_rate * frame.exposure_time
+    sources = of_kind(frame.plan.active, NoiseSource)
     rms = {f"{source.name} [e]": source.variance(dark, dark) ** 0.5 for source in sources}
     temporal = sum(s.variance(dark, dark) for s in sources if s.scope == "frame")
-    fpn = solved.pixel.fpn
+    fpn = frame.solved.pixel.fpn
     return {
-        "exposure_time [s]": seconds,
+        "exposure_time [s]": frame.exposure_time,
         "exposure_gain": circuit.exposure_gain,
         "system_gain [DN/e]": gain,
-        "black_level [DN]": chain.black_dn(dark),
-        "saturation [DN]": chain.saturated_dn,
+        "black_level [DN]": frame.black_dn,
+        "saturation [DN]": frame.chain.saturated_dn,
         "full_well [e]": circuit.full_well,
         "dark_signal [e]": dark,
         "dark_variance [DN2]": gain**2 * temporal + ROUNDING,
         **rms,
         **{
             f"{what}.{branch.name}{unit}": value
-            for branch in chain.branches
+            for branch in frame.chain.branches
             for what, unit, value in (
                 ("system_gain", " [DN/e]", 1 / branch.circuit.electrons_per_dn),
                 ("offset", " [DN]", branch.circuit.offset),
@@ -141,6 +181,6 @@ def noise_labels(
         },
         "gain_pixel": fpn.gain_pixel or 0.0,
         "gain_column": fpn.gain_column or 0.0,
-        "mean [DN]": float(dn.mean(dtype=float)),
-        "saturated_fraction": float(np.mean(dn >= chain.saturated_dn)),
+        "mean [DN]": float(result.dn.mean(dtype=float)),
+        "saturated_fraction": float(np.mean(result.dn >= frame.chain.saturated_dn)),
     }

@@ -3,34 +3,58 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from vcam_cli import units
 from vcam_cli.datasets.dataset_file import DatasetFile
+from vcam_cli.datasets.frame_work import Record, read_records
 from vcam_cli.datasets.shards import Packer, Shard
 from vcam_cli.files import tables
 
 
-def write(file: DatasetFile, packer: Packer, found: list[Shard], path: Path) -> None:
+@dataclass(frozen=True)
+class Packed:
+    """The shards that are packed, their labels and failures."""
+
+    shards: list[Shard]
+    labels: list[str]
+    """Names of all labels that any frame has."""
+    failed: int
+    """Number of frames that failed."""
+
+
+def packed(packer: Packer, shards: list[Shard]) -> Packed:
+    """Return shards that are packed, their labels and failures."""
+    labels: dict[str, None] = {}
+    failed = 0
+    for shard in shards:
+        content = packer.content(shard) or {"labels": (), "failed": 0}
+        labels |= dict.fromkeys(content["labels"])
+        failed += content["failed"]
+    return Packed(shards, list(labels), failed)
+
+
+def write(file: DatasetFile, packer: Packer, found: Packed, path: Path) -> None:
     """Write a row for every frame of the shards that are packed."""
     drawn = {name: _unit(file, name) for name in file.model.vary}
-    labels = _label_columns(packer, found)
     kinds = file.model.write
     columns = [
         *("frame", "shard", "scene", "crop_row", "crop_column", "seed_frame"),
         *(f"{name} [{unit}]" if unit else name for name, unit in drawn.items()),
-        *labels,
+        *found.labels,
         *(f"sha256_{kind}" for kind in kinds),
         "error",
     ]
 
     def rows() -> Iterator[tuple[tables.Cell, ...]]:
-        for shard in found:
-            content = packer.content(shard) or {}
+        for shard in found.shards:
+            content = packer.content(shard)
+            records = read_records(content["records"]) if content else {}
             for number in shard.frames:
                 name, frame = shard.name(number), file.frame(number)
-                known, hashes = (content[key].get(name, {}) for key in ("labels", "hashes"))
+                known = records.get(name, Record())
                 yield (
                     name,
                     shard.number,
@@ -39,26 +63,12 @@ def write(file: DatasetFile, packer: Packer, found: list[Shard], path: Path) -> 
                     frame.crop.get("column", ""),
                     frame.seed,
                     *(_cell(frame.values[key], unit) for key, unit in drawn.items()),
-                    *(known.get(label, "") for label in labels),
-                    *(hashes.get(kind, "") for kind in kinds),
-                    content["errors"].get(name, ""),
+                    *(known.labels.get(label, "") for label in found.labels),
+                    *(known.hashes.get(kind, "") for kind in kinds),
+                    known.error,
                 )
 
     tables.write_table(path, columns, rows())
-
-
-def failures(packer: Packer, found: list[Shard]) -> int:
-    """Return the number of frames that failed, among the shards that are packed."""
-    return sum(len((packer.content(shard) or {}).get("errors", {})) for shard in found)
-
-
-def _label_columns(packer: Packer, found: list[Shard]) -> list[str]:
-    """Return the names of all labels that any frame has."""
-    names: dict[str, None] = {}
-    for shard in found:
-        for labels in (packer.content(shard) or {}).get("labels", {}).values():
-            names |= dict.fromkeys(labels)
-    return list(names)
 
 
 def _unit(file: DatasetFile, path: str) -> str:

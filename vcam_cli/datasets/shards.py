@@ -1,24 +1,23 @@
 """Shards: finished frames of a data set, packed together, with their records.
 
-A frame is kept by itself when it is finished, as a point of a sweep is. When all frames of a shard
-are there they are packed, one after the other, and kept no longer: the disk holds each frame once,
-and one shard more. The record of a shard and its frames is a point of its own.
+Frames are computed in parts of a shard, and a part is kept when it is finished, as a point of a
+sweep is. As soon as all parts of a shard are there they are packed, one after the other, and kept
+no longer: the disk holds each frame once, and one shard more. The record of a shard and its frames
+is a point of its own.
 """
 
 from __future__ import annotations
 
-import hashlib
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.datasets.frame_work import NPZ
+from vcam_cli.datasets.frame_work import NPZ, RECORDS, Record, read_records, write_records
 from vcam_cli.errors import bad
 from vcam_cli.files import frame_archive
 from vcam_cli.files.atomic import write_whole
@@ -26,10 +25,21 @@ from vcam_cli.files.images import tiff
 from vcam_cli.files.points_store import SweepFolder
 from vcam_cli.files.records import Fingerprint, Proofs, file_fingerprint
 from vcam_cli.files.report import hash_text, to_json
-from vcam_cli.sweeps.sweep_result import read_outcome
 
-NamedArrays = tuple[str, dict[str, Array]]
-"""The name of a frame, and its arrays by kind."""
+Stored = tuple[frame_archive.Archive, str, str, str]
+"""An array: the archive of its part and its name there, the name of its frame, its kind."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """Frames of a shard that are computed and kept together."""
+
+    id: str
+    """Hash of all that their arrays depend on, wherever files lie."""
+    lit: tuple[range, ...]
+    """Numbers of frames that share a light, all of them, for every light."""
+    numbers: tuple[int, ...]
+    """Those of the shard, as they are computed."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +49,7 @@ class Shard:
     number: int
     """From 0."""
     frames: range
-    ids: tuple[str, ...]
-    """Of its frames."""
+    parts: tuple[Part, ...]
     digits: int
     """Of the frames' numbers in names."""
 
@@ -50,7 +59,12 @@ class Shard:
 
     def id(self, format: str, scale: int) -> str:
         """Return the hash of all that the shard depends on."""
-        return hash_text(to_json([format, scale, self.digits, self.number, list(self.ids)]))[:32]
+        return hash_text(to_json([format, scale, self.digits, self.number, self.ids]))[:32]
+
+    @property
+    def ids(self) -> list[str]:
+        """Those of its parts."""
+        return [part.id for part in self.parts]
 
 
 @dataclass(frozen=True)
@@ -65,7 +79,11 @@ class Packer:
     """The record that the folder had: files that it proves may be replaced."""
 
     def content(self, shard: Shard) -> dict[str, Any] | None:
-        """Return the record of a shard: its files, and hashes, labels, errors of its frames."""
+        """Return the record of a shard.
+
+        It has its files, the number of frames that failed, the names of all labels, and the records
+        of the frames as a text.
+        """
         return self.folder.read(shard.id(self.format, self.scale))
 
     def files(self, shard: Shard) -> dict[str, Fingerprint] | None:
@@ -82,42 +100,51 @@ class Packer:
 
         Raises BadInput where a file of another program is in the way, CannotDo.
         """
-        content: dict[str, Any] = {"hashes": {}, "labels": {}, "errors": {}}
-        frames = self._frames(shard, content)
+        records: dict[str, Record] = {}
         write = self._write_archive if self.format == "npz" else self._write_files
-        content["files"] = write(shard, frames)
+        files = write(shard, self._arrays(shard, records))
+        labels = dict.fromkeys(name for record in records.values() for name in record.labels)
+        content = {
+            "files": files,
+            "failed": sum(bool(record.error) for record in records.values()),
+            "labels": list(labels),
+            "records": write_records(records),
+        }
         self.folder.write(shard.id(self.format, self.scale), content)
-        for point in shard.ids:
-            self.folder.discard(point, (NPZ, "json"))
-        files: dict[str, Fingerprint] = content["files"]
+        for part in shard.parts:
+            self.folder.discard(part.id, (NPZ, "json"))
         return files
 
-    def _frames(self, shard: Shard, content: dict[str, Any]) -> Iterator[NamedArrays]:
-        """Yield name and arrays of all frames that did not fail; fill in their records."""
-        for number, point in zip(shard.frames, shard.ids, strict=True):
-            name, known = shard.name(number), self.folder.read(point)
-            outcome = read_outcome(point, known or {})
-            content["labels"][name] = outcome.metrics
-            if outcome.error:
-                content["errors"][name] = outcome.error
-                continue
-            arrays = frame_archive.read_arrays(self.folder.file(point, NPZ))
-            content["hashes"][name] = {kind: _hash(values) for kind, values in arrays.items()}
-            yield name, arrays
+    def _arrays(self, shard: Shard, records: dict[str, Record]) -> Iterator[Stored]:
+        """Yield the arrays of all frames that did not fail, in the order of parts.
 
-    def _write_archive(self, shard: Shard, frames: Iterator[NamedArrays]) -> dict[str, Fingerprint]:
+        Fill in the records of all frames.
+        """
+        for part in shard.parts:
+            with frame_archive.Archive(self.folder.file(part.id, NPZ)) as archive:
+                own = read_records(archive.text(RECORDS))
+                for number in part.numbers:
+                    name, record = shard.name(number), own[str(number)]
+                    records[name] = record
+                    for kind in record.hashes:
+                        yield archive, f"{number}.{kind}", name, kind
+
+    def _write_archive(self, shard: Shard, arrays: Iterator[Stored]) -> dict[str, Fingerprint]:
         name = f"shard_{shard.number:04d}.npz"
-        return {name: self._put(name, partial(frame_archive.write_archive, frames=frames))}
+        members = (
+            (f"{frame}.{kind}", archive.stored(stored)) for archive, stored, frame, kind in arrays
+        )
+        return {name: self._put(name, partial(frame_archive.write_archive, arrays=members))}
 
-    def _write_files(self, shard: Shard, frames: Iterator[NamedArrays]) -> dict[str, Fingerprint]:
+    def _write_files(self, shard: Shard, arrays: Iterator[Stored]) -> dict[str, Fingerprint]:
         files = {}
-        for name, arrays in frames:
-            for kind, values in arrays.items():
-                whole = values if kind == "raw" else whole_numbers(values, scale(kind, self.scale))
-                file = f"shard_{shard.number:04d}/{name}_{kind}.tif"
-                (self.folder.path / file).parent.mkdir(exist_ok=True)
-                put = partial(tiff.write_tiff, samples=whole, description=f"vcam {kind}")
-                files[file] = self._put(file, put)
+        for archive, stored, frame, kind in arrays:
+            values = archive.array(stored)
+            whole = values if kind == "raw" else whole_numbers(values, scale(kind, self.scale))
+            file = f"shard_{shard.number:04d}/{frame}_{kind}.tif"
+            (self.folder.path / file).parent.mkdir(exist_ok=True)
+            put = partial(tiff.write_tiff, samples=whole, description=f"vcam {kind}")
+            files[file] = self._put(file, put)
         return files
 
     def _put(self, name: str, write: Any) -> Fingerprint:
@@ -152,18 +179,3 @@ def whole_numbers(values: Array, factor: int) -> Array:
     whole = np.rint(np.clip(values.astype(float) * factor, 0, 2**32 - 1))
     packed: Array = whole.astype(np.uint16 if whole.max(initial=0) < 1 << 16 else np.uint32)
     return packed
-
-
-def _hash(values: Array) -> str:
-    """Return the SHA-256 of values in C order, little-endian."""
-    little = values.astype(values.dtype.newbyteorder("<"), copy=False)
-    return hashlib.sha256(np.ascontiguousarray(little).tobytes()).hexdigest()
-
-
-def shards(frames: int, count: int, ids: Sequence[str]) -> list[Shard]:
-    """Return the shards of `frames`, of equal size, in the order of the frames."""
-    ends = [frames * n // count for n in range(count + 1)]
-    digits = max(6, len(str(frames - 1)))
-    return [
-        Shard(n, range(a, b), tuple(ids[a:b]), digits) for n, (a, b) in enumerate(pairwise(ends))
-    ]

@@ -36,6 +36,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import ClassVar, Literal, TypeVar
 
 from vcam_cli.arrays import Array
@@ -61,7 +62,13 @@ def of_kind(effects: Iterable[Effect], *kinds: type[Kind]) -> tuple[Kind, ...]:
     tuple of Kind
         The effects that are instances of a kind.
     """
-    return tuple(effect for effect in effects if isinstance(effect, kinds))
+    return tuple(effect for effect in effects if _is_of(type(effect), kinds))
+
+
+@cache
+def _is_of(effect: type[Effect], kinds: tuple[type[Effect], ...]) -> bool:
+    """Return whether effects of a class are of a kind; a frame asks a hundred times."""
+    return issubclass(effect, kinds)
 
 
 @dataclass(frozen=True)

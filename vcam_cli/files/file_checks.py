@@ -5,6 +5,7 @@ import stat
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -53,14 +54,21 @@ def is_raw(path: Path) -> bool:
 
 def check_file(path: Path) -> None:
     """Refuse what is no whole regular file, before OpenImageIO sees it."""
-    size = check_regular(path)
+    status = check_regular(path)
+    if not _is_whole(path, status.st_size, status.st_ctime_ns, status.st_ino):
+        raise truncated_file()
+
+
+@lru_cache(1024)
+def _is_whole(path: Path, size: int, changed: int, inode: int) -> bool:
+    """Return whether a file is whole, where its format shows it; read once in each state."""
+    del changed, inode
     with open(path, "rb") as file:
-        if file.read(8) == PNG_START and not _png_is_whole(file, size):
-            raise truncated_file()
+        return file.read(8) != PNG_START or _png_is_whole(file, size)
 
 
-def check_regular(path: Path) -> int:
-    """Return the size of a regular file [bytes]; refuse all else unopened: a pipe would hang."""
+def check_regular(path: Path) -> os.stat_result:
+    """Return the state of a regular file; refuse all else unopened: a pipe would hang."""
     str(path).encode("utf-8")  # OpenImageIO takes no other names
     try:
         status = os.stat(path)
@@ -72,7 +80,7 @@ def check_regular(path: Path) -> int:
         raise UnusableFile("is a device, pipe or socket", "give a regular image file")
     if status.st_size == 0:
         raise UnusableFile("the file is empty", "give a complete image file")
-    return status.st_size
+    return status
 
 
 def _png_is_whole(file: Any, size: int) -> bool:

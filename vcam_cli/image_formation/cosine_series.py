@@ -25,7 +25,7 @@ it is a chirp-z transform, four times slower, which takes as much memory as ther
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 import scipy.fft
@@ -339,7 +339,8 @@ def _sign(segment: int, odd: bool = False) -> int:
     return 1 if (segment + (not odd)) // 2 % 2 == 0 else -1
 
 
-def segments(period: int, terms: int, odd: bool = False) -> list[tuple[slice, slice, int]]:
+@lru_cache(1 << 10)
+def segments(period: int, terms: int, odd: bool = False) -> tuple[tuple[slice, slice, int], ...]:
     """Return how cosine terms, or sine terms, fold onto a basis of few samples.
 
     cos(pi k (i + 1/2) / L) repeats with k: k = 2L - j gives minus the cosine of j, k = 2L + j
@@ -357,7 +358,7 @@ def segments(period: int, terms: int, odd: bool = False) -> list[tuple[slice, sl
 
     Returns
     -------
-    list of tuple
+    tuple of tuple
         Slice of the basis, slice of the terms, and sign. Basis slices run backwards in odd
         segments, terms always forward.
     """
@@ -375,4 +376,4 @@ def segments(period: int, terms: int, odd: bool = False) -> list[tuple[slice, sl
             stop = period - 1 - n
             basis = slice(period - 1, stop if stop >= 0 else None, -1)
         out.append((basis, slice(first, first + n), _sign(m, odd)))
-    return out
+    return tuple(out)

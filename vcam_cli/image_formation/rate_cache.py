@@ -39,12 +39,12 @@ class RateCache:
         self._peaks: dict[str, float] = {}
 
     def transfer(self, key: str, make: Callable[[], Transfer]) -> Transfer:
-        """Return a transfer, computed where the camera before had other light.
+        """Return a transfer, computed where the camera before had another one.
 
         Parameters
         ----------
         key : str
-            All that the light depends on: `Solved.light_key`.
+            All that it depends on: `Solved.lens_key`, and the number of the scene's components.
         make : callable
             Function that computes it.
 

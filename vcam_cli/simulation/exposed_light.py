@@ -58,7 +58,7 @@ class ExposedLight:
     """Effects that act before electrons are counted and are not left out of the light."""
 
 
-def expose(seen: SceneLight, light: photon_rate.Rate) -> ExposedLight:
+def expose(seen: SceneLight, light: photon_rate.Rate, is_planned: bool = True) -> ExposedLight:
     """Return the light of an exposure whose time is given or chosen for the scene.
 
     Parameters
@@ -67,6 +67,8 @@ def expose(seen: SceneLight, light: photon_rate.Rate) -> ExposedLight:
         The scene before its camera, at the gain that its file gives.
     light : Rate
         Light of the whole exposure.
+    is_planned : bool, optional
+        Whether a plan needs what effects change, and the levels of the scene.
 
     Raises
     ------
@@ -143,6 +145,25 @@ def expose(seen: SceneLight, light: photon_rate.Rate) -> ExposedLight:
     )
     peak = (float(rate.max()) + dark) * time
     refuse_too_much(max(peak, white * time, dark))
+    full = max(1.0, min(solved.chain.metered.full_well, peak))
+    alone = not times and solved.binning is None
+    signal = SignalLevels(
+        full,
+        time,
+        dark * time,
+        solved.binning,
+        _levels(layout, rate, dark, time, circuit.full_well) if is_planned else (),
+        extreme_signal(of_kind(enabled, NoiseSource), peak, dark * time) if alone else math.inf,
+    )
+    exposed = ExposedLight(
+        *(rate, times, signal, chosen, {}, light_plan, step_rates, full_charge),
+        white_rate=white_rate,
+        halves=halves,
+        sharing=sharing,
+        effects=effects,
+    )
+    if not is_planned:
+        return exposed
     lit = timed_gains.apply(light.values, timed, layout.lattice, 0.0, time)
     changes = _pixel_changes(layout, groups.collect(lit), enabled, effects, time)
     for effect in timed:
@@ -158,23 +179,7 @@ def expose(seen: SceneLight, light: photon_rate.Rate) -> ExposedLight:
         most = well if full_charge is None else full_charge / time - dark
         deferred = np.minimum(rate, most) - np.minimum(groups.collect(collected), well)
         changes |= dict.fromkeys(transports, rms(deferred))
-    full = max(1.0, min(solved.chain.metered.full_well, peak))
-    alone = not times and solved.binning is None
-    signal = SignalLevels(
-        full,
-        time,
-        dark * time,
-        solved.binning,
-        _levels(layout, rate, dark, time, circuit.full_well),
-        extreme_signal(of_kind(enabled, NoiseSource), peak, dark * time) if alone else math.inf,
-    )
-    return ExposedLight(
-        *(rate, times, signal, chosen, changes, light_plan, step_rates, full_charge),
-        white_rate=white_rate,
-        halves=halves,
-        sharing=sharing,
-        effects=effects,
-    )
+    return replace(exposed, changes=changes)
 
 
 def _levels(

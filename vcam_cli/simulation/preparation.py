@@ -209,6 +209,36 @@ def plan_frame(
         run = run.after(2 * cost_model.light_seconds(solved.layout, light.spectrum, run.workers))
     decided = _with_seconds(solved, light, decided, run)
     run.stages.watch.expect(decided.seconds)
+    return _prepared(seen, light, exposed, solved, decided)
+
+
+def whole_frame(seen: SceneLight, light: photon_rate.Rate, exposed: ExposedLight) -> Prepared:
+    """Return a camera that is ready for a frame with all effects that are not switched off.
+
+    Nothing is planned: the plan has no decisions, and no seconds.
+
+    Parameters
+    ----------
+    seen, light, exposed
+        As those of `plan_frame`.
+
+    Returns
+    -------
+    Prepared
+        The camera, ready to take its frame.
+    """
+    solved = seen.solved.at_gain(exposed.settings.gain)
+    everything = plan.Plan((), solved.effects.enabled, solved.settings, 0.0, seen.memory)
+    return _prepared(seen, light, exposed, solved, everything)
+
+
+def _prepared(
+    seen: SceneLight,
+    light: photon_rate.Rate,
+    exposed: ExposedLight,
+    solved: Solved,
+    decided: plan.Plan,
+) -> Prepared:
     return Prepared(
         solved=solved,
         scene=seen.scene,

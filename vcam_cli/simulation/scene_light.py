@@ -65,6 +65,8 @@ class SceneLight:
     """Memory of a frame without its scene [bytes]."""
     picture_memory: int
     """Memory of what was read of the scene [bytes]."""
+    light_key: str
+    """That of the camera."""
 
 
 def scene_light(solved: Solved, picture: ScenePicture, run: Run) -> SceneLight:
@@ -98,14 +100,6 @@ def scene_light(solved: Solved, picture: ScenePicture, run: Run) -> SceneLight:
         scene = _scene(solved, picture, effects)
     with run.stages("optics"):
         transfer, white_rate = _transfer(solved, scene, effects, run.rate_cache)
-        brightest = float(white_rate.max())
-        saturation = solved.electrical.saturation / solved.layout.binning_groups.summed_charges
-        ceiling = auto_exposure.ceiling(solved.exposure, brightest, saturation)
-        metered = solved.chain.metered.saturation / solved.layout.binning_groups.summed_charges
-        full = auto_exposure.ceiling(solved.exposure, brightest, metered)
-        overexposure = _brightest_around(scene) * brightest / ceiling
-        if overexposure > 1:  # of what lies beside the array, too
-            scene = _scene(solved, picture, effects, overexposure)
         path = OpticalPath(
             transfer=transfer,
             geometry=solved.layout.lattice,
@@ -113,14 +107,82 @@ def scene_light(solved: Solved, picture: ScenePicture, run: Run) -> SceneLight:
             mosaic=solved.layout.mosaic,
             effects=effects,
             workers=run.workers,
-            ceiling=ceiling,
-            full=min(ASSUMED * _brightest(scene) * brightest, full),
-            fullness=_fullness(solved, scene, float(white_rate.min())),
             optional=solved.effects.optional(effects),
-            layers=layer_optics(solved, effects, scene),
         )
-    read = scene_bytes(picture)
-    return SceneLight(solved, scene, transfer, white_rate, path, frame_bytes, read)
+        read = scene_bytes(picture)
+        key = solved.light_key
+        seen = SceneLight(solved, scene, transfer, white_rate, path, frame_bytes, read, key)
+        return exposed_as(seen, solved, picture)
+
+
+def exposed_as(seen: SceneLight, solved: Solved, picture: ScenePicture) -> SceneLight:
+    """Return a scene whose light is formed as exactly as an exposure needs it.
+
+    Parameters
+    ----------
+    seen : SceneLight
+        The scene before a camera of the same light.
+    solved : Solved
+        The camera of the exposure.
+    picture : ScenePicture
+        What the scene's files hold.
+
+    Returns
+    -------
+    SceneLight
+        The scene before this camera.
+    """
+    effects, scene = seen.path.effects, seen.scene
+    levels = _levels(solved, scene, seen.white_rate)
+    overexposure = _brightest_around(scene) * float(seen.white_rate.max()) / levels.ceiling
+    if overexposure > 1:  # of what lies beside the array, too
+        scene = _scene(solved, picture, effects, overexposure)
+    path = replace(
+        seen.path,
+        ceiling=levels.ceiling,
+        full=levels.full,
+        fullness=levels.fullness,
+        layers=layer_optics(solved, effects, scene),
+    )
+    return replace(seen, solved=solved, scene=scene, path=path)
+
+
+@dataclass(frozen=True)
+class _Levels:
+    """Levels of light as `OpticalPath` has them."""
+
+    ceiling: float
+    full: float
+    fullness: float
+
+
+def _levels(solved: Solved, scene: AnyScene, white_rate: Array) -> _Levels:
+    """Return the levels that an exposure sets. `white_rate` is as `SceneLight.white_rate`."""
+    brightest, charges = float(white_rate.max()), solved.layout.binning_groups.summed_charges
+    ceiling, full = (
+        auto_exposure.ceiling(solved.exposure, brightest, saturation / charges)
+        for saturation in (solved.electrical.saturation, solved.chain.metered.saturation)
+    )
+    full = min(ASSUMED * _brightest(scene) * brightest, full)
+    return _Levels(ceiling, full, _fullness(solved, scene, float(white_rate.min())))
+
+
+def rate_of_full(seen: SceneLight, solved: Solved) -> float:
+    """Return the rate at which a camera's pixels are full, before a scene of another's light.
+
+    Parameters
+    ----------
+    seen : SceneLight
+        Scene before a camera of the same light.
+    solved : Solved
+        The camera.
+
+    Returns
+    -------
+    float
+        Photo-electrons per second [e/s], as `OpticalPath.ceiling`.
+    """
+    return _levels(solved, seen.scene, seen.white_rate).ceiling
 
 
 def formed_light(seen: SceneLight, run: Run) -> photon_rate.Rate:
@@ -142,7 +204,7 @@ def formed_light(seen: SceneLight, run: Run) -> photon_rate.Rate:
     with run.stages("optics"):
         if run.rate_cache is None:
             return form()
-        return run.rate_cache.rate(seen.solved.light_key, seen.path.ceiling, form)
+        return run.rate_cache.rate(seen.light_key, seen.path.ceiling, form)
 
 
 def light_during(seen: SceneLight, light: photon_rate.Rate, start: float, stop: float) -> Array:
@@ -298,7 +360,8 @@ def _transfer(
         solved.settings.wavelength_step,
     )
     try:
-        whole = compute() if rate_cache is None else rate_cache.transfer(solved.light_key, compute)
+        key = f"{solved.lens_key} {len(scene.spectra)}"
+        whole = compute() if rate_cache is None else rate_cache.transfer(key, compute)
     except ValueError as error:
         raise bad(
             "scene.wavelengths", str(error), "narrow the wavelengths, or extend the spectrum"

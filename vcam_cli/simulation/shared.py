@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -12,17 +11,27 @@ from typing import Any
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.image_formation.rate_cache import RateCache
+from vcam_cli.physics.cache import ByteCache
 from vcam_cli.simulation.output.provenance import data_files
 from vcam_cli.simulation.scene_files import scene_bytes
 
 Picture = tuple[Any, tuple[str, ...]]
 """What a scene's file holds, and notes about it."""
 KEPT = 1 << 26
-"""Bytes of light, and of a picture, that a process keeps by itself: 12 megapixels of light."""
+"""Bytes of light, and of pictures, that a process keeps by itself: 12 megapixels of light."""
 _FILES = 1024
 """Files whose states are remembered."""
 _State = tuple[int, int, int] | None
 """Time of the last change [ns], size and number of a file; None where it cannot be looked at."""
+
+
+@dataclass(frozen=True)
+class _KeptPicture:
+    picture: Picture
+
+    @property
+    def nbytes(self) -> int:
+        return scene_bytes(self.picture[0])
 
 
 @dataclass
@@ -33,9 +42,8 @@ class Shared:
     """
 
     rate_cache: RateCache = field(default_factory=RateCache)
-    largest_picture: float = math.inf
-    """Bytes of a picture up to which it is kept."""
-    _last: tuple[str, Picture] | None = None
+    pictures: ByteCache[_KeptPicture] = field(default_factory=lambda: ByteCache(0))
+    """By default the last one alone."""
 
     def picture(self, camera: Camera, read: Callable[[], Picture]) -> Picture:
         """Return the contents of a scene's files, read once for cameras with the same source.
@@ -53,19 +61,12 @@ class Shared:
             Contents and notes.
         """
         key = camera.scene.source.model_dump_json(exclude={"crop"})
-        last = self._last
-        if last is not None and last[0] == key:
-            return last[1]
-        found = read()
-        if scene_bytes(found[0]) <= self.largest_picture:
-            self._last = key, found
-        return found
+        return self.pictures.get(key, lambda: _KeptPicture(read())).picture
 
     @property
     def nbytes(self) -> int:
-        """Memory of light and picture [bytes]."""
-        last = self._last
-        return self.rate_cache.nbytes + (0 if last is None else scene_bytes(last[1][0]))
+        """Memory of light and pictures [bytes]."""
+        return self.rate_cache.nbytes + self.pictures.nbytes
 
 
 class Recent:
@@ -77,7 +78,7 @@ class Recent:
 
     def clear(self) -> None:
         """Keep nothing of what was."""
-        self._shared = Shared(RateCache(KEPT, strict=True), KEPT)
+        self._shared = Shared(RateCache(KEPT, strict=True), ByteCache(KEPT, strict=True))
         self._files: dict[Path, _State] = {}
 
     def shared_with(self, camera: Camera) -> Shared:

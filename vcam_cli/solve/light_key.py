@@ -40,8 +40,12 @@ INDEPENDENT_KEYS = tuple(
 _BEHIND_LIGHT = {kind.name for kind in ORDER if not kind.acts_on_light}
 
 
-def light_key(camera: Camera) -> str:
-    """Return all that the light on the sensor depends on, as a text.
+LightForm = dict[str, Any]
+"""What the light on the sensor depends on, as YAML has it."""
+
+
+def light_form(camera: Camera) -> LightForm:
+    """Return all that the light on the sensor depends on.
 
     The level of saturation is not in it.
 
@@ -52,8 +56,8 @@ def light_key(camera: Camera) -> str:
 
     Returns
     -------
-    str
-        JSON of the camera file without the `INDEPENDENT_KEYS`.
+    dict
+        The camera file without the `INDEPENDENT_KEYS`.
     """
     form = camera.model_dump(mode="json")
     moving = ("exposure",) if camera.scene.moves else ()
@@ -68,7 +72,47 @@ def light_key(camera: Camera) -> str:
     if isinstance(form.get("effects"), dict):
         own = {name: state for name, state in form["effects"].items() if name not in _BEHIND_LIGHT}
         form["effects"] = own or "auto"
+    return form
+
+
+def light_key(camera: Camera) -> str:
+    """Return the form as a text.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera.
+    """
+    return form_key(light_form(camera))
+
+
+def form_key(form: LightForm) -> str:
+    """Return a form as a text.
+
+    Parameters
+    ----------
+    form : LightForm
+        That of a camera.
+    """
     return json.dumps(form, sort_keys=True)
+
+
+def lens_key(form: LightForm) -> str:
+    """Return the same less the picture that is shown, and its crop.
+
+    Cameras of one key have the same lens, pixels and lamp. Pictures may have other numbers of
+    channels.
+
+    Parameters
+    ----------
+    form : LightForm
+        That of the camera.
+    """
+    source = form["scene"]["source"]
+    if source.get("kind") == "image" and "depth" not in source:
+        source = {name: value for name, value in source.items() if name not in ("file", "crop")}
+        form = form | {"scene": form["scene"] | {"source": source}}
+    return form_key(form)
 
 
 def changes_light(path: str) -> bool:

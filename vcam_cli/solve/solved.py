@@ -45,6 +45,7 @@ from vcam_cli.solve.chain import readout_chain
 from vcam_cli.solve.effects import CameraEffects, camera_effects
 from vcam_cli.solve.layers import SolvedLayer, solve_layer
 from vcam_cli.solve.layout import camera_layout
+from vcam_cli.solve.light_key import LightForm
 from vcam_cli.solve.response import pixel_response
 from vcam_cli.solve.settings import camera_settings
 from vcam_cli.spectra import Spectrum
@@ -71,6 +72,8 @@ class Solved:
     """What pixels on the axis make of radiance."""
     base_iso: float
     """ISO speed at gain 1; 0 of a camera that sees nothing of daylight."""
+    per_exposure: float = 0.0
+    """Electrons of daylight in the color with most of them [e / (lx s)]."""
 
     # --- what the file says --------------------------------------------------------------------
 
@@ -200,7 +203,17 @@ class Solved:
     @cached_property
     def light_key(self) -> str:
         """All that the light on the sensor depends on, but for the level of saturation."""
-        return light_key.light_key(self.camera)
+        return light_key.form_key(self.light_form)
+
+    @cached_property
+    def lens_key(self) -> str:
+        """The same less the picture that is shown."""
+        return light_key.lens_key(self.light_form)
+
+    @cached_property
+    def light_form(self) -> LightForm:
+        """What the light on the sensor depends on, as YAML has it."""
+        return light_key.light_form(self.camera)
 
     @cached_property
     def layers(self) -> tuple[SolvedLayer, ...]:
@@ -260,6 +273,22 @@ class Solved:
         return found
 
     # --- the same camera with other values -----------------------------------------------------
+
+    def behind_light(self, camera: Camera) -> Solved:
+        """Return a camera on whose sensor the same light falls.
+
+        Parameters
+        ----------
+        camera : Camera
+            Camera of the same `light_key`: its circuit, noise, ADC, exposure or seeds are others.
+
+        Returns
+        -------
+        Solved
+            That camera. What follows from lens, filters and photodetector is not solved again.
+        """
+        before = camera.before_scene_of(self.camera)
+        return _solve(before, self.response, self.per_exposure)
 
     def _with(self, **changes: Any) -> Self:
         """Return the camera with some sections changed that nothing solved follows from."""
@@ -431,15 +460,24 @@ def solve(camera: Camera) -> Solved:
     CannotDo
         Where the positions of pixels need too fine a lattice.
     """
+    return _solve(camera)
+
+
+def _solve(
+    camera: Camera, response: PixelResponse | None = None, per_exposure: float | None = None
+) -> Solved:
+    """Return all that follows from a camera, of which these two may be known."""
     found = geometry(camera)
     layout = camera_layout(camera, found)
     circuit = electrical(camera)
     effects = camera_effects(camera, found)
     settings = layout.settings(camera_settings(camera))
-    response = pixel_response(camera, found, layout.mosaic)
+    response = response or pixel_response(camera, found, layout.mosaic)
     solved = Solved(camera, found, layout, circuit, effects, settings, response, base_iso=0.0)
-    per_exposure = solved.electrons_per_exposure(iso_speed.daylight())
-    most = float(per_exposure.max()) * layout.binning_groups.summed_charges
+    if per_exposure is None:
+        per_exposure = float(solved.electrons_per_exposure(iso_speed.daylight()).max())
+    solved = replace(solved, per_exposure=per_exposure)
+    most = per_exposure * layout.binning_groups.summed_charges
     if most <= 0:
         return solved.at_gain(iso_speed.gain(camera.exposure, 0.0, circuit.exposure_gain))
     at_one = circuit

@@ -6,7 +6,7 @@ Finished points are kept at once, so that an interrupted study continues.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import replace
 from typing import Protocol
@@ -75,22 +75,25 @@ def compute(
     watch: Observer,
     tell: Callable[[str], None],
     stage: str = "sweep",
+    sizes: Mapping[str, int] | None = None,
 ) -> int:
     """Compute the points of these groups, and return their number.
 
-    stage: name of the work in the progress.
+    stage: name of the work in the progress; sizes: id of a point -> how many it counts for, where
+    that is not 1.
     """
-    total = sum(len(group) for group in groups)
-    if not total:
+    count = sum(len(group) for group in groups)
+    if not count:
         return 0
+    total = count if sizes is None else sum(sizes.values())
     watch.begin(stage)
     watch.step(0, total)
     computed, has_told = 0, False
-    outcomes = _outcomes(groups, total, points, execution, tell)
+    outcomes = _outcomes(groups, count, points, execution, tell)
     with closing(outcomes):  # type: ignore[type-var]
         for outcome in outcomes:
             points.keep(outcome)
-            computed += 1
+            computed += 1 if sizes is None else sizes[outcome.id]
             watch.step(computed, total)
             if outcome.trace and not has_told:
                 tell(outcome.trace)

@@ -66,7 +66,7 @@ class JobQueue:
     """The points that are left, handed out group by group, in batches."""
 
     def __init__(self, groups: Groups, ask: Ask) -> None:
-        self._groups = deque(deque(group) for group in groups if group)
+        self._groups = deque(group for group in groups if group)
         self._ask = ask
         self._own: dict[int, deque[Task]] = {}
         self._claimed: deque[Task] = deque()
@@ -107,7 +107,8 @@ class JobQueue:
         """Return the group of a worker; where none is left, the longest of the others to share."""
         if not self._own.get(worker):
             longest = max(self._own.values(), key=len, default=deque())
-            self._own[worker] = self._groups.popleft() if self._groups else longest
+            # Its points are made when it begins: a data set has millions of frames.
+            self._own[worker] = deque(self._groups.popleft()) if self._groups else longest
         return self._own[worker]
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -86,6 +87,7 @@ def blocks(axis: Axis) -> Blocks:
     return Blocks(edges, weights, start[merged] * step, np.maximum.reduceat(stop, merged) * step)
 
 
+@lru_cache(1 << 7)
 def _starts(terms: int) -> Array:
     """Return the first terms of blocks whose width grows with the frequency."""
     starts = [*range(min(ALONE, terms))]
@@ -93,7 +95,9 @@ def _starts(terms: int) -> Array:
     while at < terms:
         starts.append(at)
         at += max(1, int(at * WIDTH))
-    return np.array(starts)
+    found = np.array(starts)
+    found.setflags(write=False)
+    return found
 
 
 @dataclass(frozen=True, eq=False)

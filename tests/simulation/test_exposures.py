@@ -1,0 +1,61 @@
+"""Several exposures of one light: what each camera takes by itself, with all effects."""
+
+import numpy as np
+import pytest
+from image_formation.test_rate_cache import BASE, CHANGES, changed
+from making import camera
+
+from vcam_cli import simulate
+from vcam_cli.simulation.exposures import exposures, share_light
+from vcam_cli.simulation.shared import Shared
+
+DIM = {"scene.radiance": "0.001 W/(sr m2)", "effects": "all"}
+"""A scene that fills no pixel, so that no exposure asks for more exact light than another."""
+
+
+@pytest.mark.parametrize("path", [path for path in CHANGES if path != "effects"])
+def test_each_is_the_camera_alone(tmp_path, path):
+    """For every key that is behind the light, before and behind the camera without it."""
+    before = {k: v for k, v in changed(path, 0).items() if k != path}
+    plain = before | ({path: BASE[path]} if path in BASE else {}) | DIM
+    cameras = [camera(tmp_path, plain), camera(tmp_path, changed(path, CHANGES[path]) | DIM)]
+    for order in (cameras, cameras[::-1]):
+        for made, found in zip(order, exposures(order, 1, Shared()), strict=True):
+            alone = simulate(made, 1, shared=Shared())
+            assert found.dn.tobytes() == alone.dn.tobytes()
+            assert found.clean_dn.tobytes() == alone.clean_dn.tobytes()
+            assert found.exposure_time == alone.exposure_time
+
+
+def test_effects_that_the_file_switches_off_stay_off(tmp_path):
+    off = {"shot_noise": "off", "dark_current": "off"}
+    first, second = camera(tmp_path, BASE | DIM), camera(tmp_path, BASE | DIM | {"effects": off})
+    wanted = {"pixel.readout.read_noise": "9 e"}
+    noisy = camera(tmp_path, BASE | wanted | DIM | {"effects": off})
+    found = [photo.frame.plan.active for photo in exposures([first, second, noisy], 1, Shared())]
+    names = [{effect.name for effect in active} for active in found]
+    assert names[0] - names[1] == set(off)
+    assert names[2] - names[1] == {"read_noise"}
+
+
+def test_light_is_formed_once_for_the_camera_that_fills_first(tmp_path):
+    """Frames do not depend on their order, nor on which of them are wanted."""
+    times = ("1 ms", "200 ms", "10 ms")
+    cameras = [camera(tmp_path, BASE | {"exposure": {"time": t}, "effects": "all"}) for t in times]
+    found = list(exposures(cameras, 1, Shared()))
+    last = simulate(cameras[1], 1, shared=Shared())
+    assert found[1].dn.tobytes() == last.dn.tobytes()
+    assert all(photo.frame.spectrum == last.frame.spectrum for photo in found)
+    [alone] = exposures(cameras[::-1], 1, Shared(), [2])
+    assert alone.dn.tobytes() == found[0].dn.tobytes()
+    short = simulate(cameras[0], 1, shared=Shared())
+    error = np.subtract(found[0].mean_electrons, short.mean_electrons, dtype=float)
+    tolerance = short.frame.settings.tolerance * short.mean_electrons.max()
+    assert np.sqrt(np.mean(error**2)) <= tolerance
+
+
+def test_what_moves_or_focuses_has_light_of_its_own(tmp_path):
+    assert share_light(camera(tmp_path, BASE))
+    assert not share_light(camera(tmp_path, BASE | {"optics.focus": "auto"}))
+    moving = {"scene.source.motion": {"x": "0.5 m/s"}}
+    assert not share_light(camera(tmp_path, BASE | moving))
