@@ -152,7 +152,7 @@ class Filter:
         """Number of terms of a plane's spectrum that are filtered."""
         return int(self._counts(self.y.frequencies).sum())
 
-    def factors(self) -> Iterator[tuple[int, int, Array, Array]]:
+    def factors(self) -> Iterator[tuple[int, slice, Array, Array]]:
         """Yield what `apply` multiplies terms with, for filters without sines.
 
         Yields
@@ -182,8 +182,8 @@ class Filter:
             one = replace(self, tables=alone)
             for rows in pieces(self.y.folded_terms, LONGEST):
                 for _, terms, weights in self.y.folding(rows):
-                    for part, color, light in one._filter_rows(ones, table, terms, weights):
-                        yield mixture, color, terms[part], light
+                    for part, colors, light in one._filter_rows(ones, table, terms, weights):
+                        yield mixture, colors, terms[part], light
 
     @property
     def is_even(self) -> bool:
