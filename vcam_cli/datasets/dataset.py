@@ -221,7 +221,7 @@ def _groups(file: DatasetFile, shard: Shard, versions: dict[str, str]) -> list[_
 
 @dataclass(frozen=True)
 class _Group(Sequence[FramesJob]):
-    """Parts of a shard, whose frames are drawn when they are asked for."""
+    """Parts of a shard; each draws its frames when it is read."""
 
     file: DatasetFile
     shard: Shard

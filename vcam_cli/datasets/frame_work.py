@@ -32,7 +32,7 @@ pictures, since other crops of them do."""
 NPZ = "npz"
 """The file of frames beside their point."""
 RECORDS = "records.json"
-"""Its member that is no array: what is known of the frames."""
+"""Its member that is no array: labels and hashes of the frames."""
 ARRAYS: dict[str, Callable[[Photograph], Array]] = {
     "raw": lambda result: result.dn,
     "clean": lambda result: result.clean_dn.astype(np.float32),

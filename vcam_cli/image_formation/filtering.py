@@ -157,12 +157,14 @@ class Filter:
 
         Yields
         ------
-        mixture, color : int
-            Numbers of both.
+        mixture : int
+            Number of the mixture.
+        colors : slice
+            Numbers of the colors.
         terms : Array
             Consecutive terms along y (n,).
         factors : Array
-            Factors (n, terms along x, those that are 0 left out) on the DCT-II coefficients behind
+            Factors (colors, n, terms along x, those that are 0 left out) on the DCT-II coefficients behind
             the terms, with their signs and what folding along y makes of them [e/s].
 
         Raises

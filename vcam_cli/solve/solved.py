@@ -466,7 +466,7 @@ def solve(camera: Camera) -> Solved:
 def _solve(
     camera: Camera, response: PixelResponse | None = None, per_exposure: float | None = None
 ) -> Solved:
-    """Return all that follows from a camera, of which these two may be known."""
+    """Return all that follows from a camera; these two are computed where not given."""
     found = geometry(camera)
     layout = camera_layout(camera, found)
     circuit = electrical(camera)

@@ -26,7 +26,7 @@ from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.pixel_signal import NeighborSharing
 
 MIDDLE = 550e-9
-"""Wavelength at which its contrast is told [m]."""
+"""Wavelength at which its contrast is stated [m]."""
 
 
 @dataclass(frozen=True)

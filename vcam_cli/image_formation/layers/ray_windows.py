@@ -228,7 +228,7 @@ def border_around(
     """Return how wide a border around windows is, and what diffracts from beyond it.
 
     The light of a line that diffracts farther than x falls on both its sides, along x and along y.
-    What layers hide beyond a window is taken to be as much as on the array, up to where they end.
+    Layers are assumed to hide as much beyond a window as on the array, up to where they end.
 
     Parameters
     ----------
