@@ -164,8 +164,8 @@ class Filter:
         terms : Array
             Consecutive terms along y (n,).
         factors : Array
-            Factors (colors, n, terms along x, those that are 0 left out) on the DCT-II coefficients behind
-            the terms, with their signs and what folding along y makes of them [e/s].
+            Factors (colors, n, terms along x, those that are 0 left out) on the DCT-II
+            coefficients behind the terms, with their signs and the fold along y [e/s].
 
         Raises
         ------
