@@ -16,9 +16,11 @@ from typing import Any, overload
 
 from vcam_cli.datasets import manifest
 from vcam_cli.datasets.dataset_file import DatasetFile
+from vcam_cli.datasets.device_frames import batch_key
 from vcam_cli.datasets.frame_work import NPZ, FramesJob
 from vcam_cli.datasets.parts import Hasher, cut
 from vcam_cli.datasets.shards import Packer, Part, Shard, scale
+from vcam_cli.devices.choice import open_device
 from vcam_cli.errors import bad
 from vcam_cli.files.points_store import SweepFolder
 from vcam_cli.files.records import Fingerprint
@@ -77,7 +79,7 @@ def dataset(
     watch, tell = watch or Silent(), tell or (lambda _: None)
     watch.begin("frames")
     versions = {name: found for name, found in provenance.versions().items() if name in LIBRARIES}
-    whole = cut(file, Hasher(file))
+    whole = cut(file, Hasher(file, execution.device))
     mine = _of_share(whole, execution)
     with SweepFolder(out, RECORD) as folder:
         asked = hash_text(to_json([shard.ids for shard in whole]))
@@ -85,14 +87,16 @@ def dataset(
         packer = Packer(folder, file.model.format, _scale(file), former)
         parts = _Parts(folder, packer, whole, execution.fresh, versions["code"])
         left = [shard for shard in mine if not parts.is_packed(shard)]
-        groups = [group for shard in left for group in _groups(file, shard, versions)]
+        groups = [g for shard in left for g in _groups(file, shard, versions, execution.device)]
         sizes = {part.id: len(part.numbers) for shard in left for part in shard.parts}
+        if execution.device != "cpu" and batch_key(file.frame(0), file.model.write) is None:
+            tell("frames take their light from the processor, one by one")
         computed = compute(groups, parts, execution, watch, tell, "frames", sizes)
         with folder.summarizing():
             packed = [(shard, parts.pack(shard)) for shard in whole]
             found = [shard for shard, files in packed if files is not None]
             there = {name: made for _, files in packed for name, made in (files or {}).items()}
-            record = _record(file, versions) | {"packed": len(found)}
+            record = _record(file, versions, execution.device) | {"packed": len(found)}
             known = manifest.packed(packer, found)
             table = partial(manifest.write, file, packer, known)
             folder.finish({MANIFEST: table}, record, file.inputs, there=there)
@@ -206,14 +210,14 @@ TOGETHER = 64
 """Parts of a group, at most: a worker keeps to it."""
 
 
-def _groups(file: DatasetFile, shard: Shard, versions: dict[str, str]) -> list[_Group]:
+def _groups(file: DatasetFile, shard: Shard, versions: dict[str, str], device: str) -> list[_Group]:
     """Return the parts of a shard; those that begin with one picture together, it is read once."""
     found: list[_Group] = []
     scene: Any = None
     for part in shard.parts:
         own = file.frame(part.numbers[0]).scene
         if not found or own is not scene or len(found[-1].parts) == TOGETHER:
-            found.append(_Group(file, shard, versions, []))
+            found.append(_Group(file, shard, versions, device, []))
         found[-1].parts.append(part)
         scene = own
     return found
@@ -226,6 +230,7 @@ class _Group(Sequence[FramesJob]):
     file: DatasetFile
     shard: Shard
     versions: dict[str, str]
+    device: str
     parts: list[Part]
 
     def __len__(self) -> int:
@@ -240,12 +245,11 @@ class _Group(Sequence[FramesJob]):
             return [self[number] for number in range(*index.indices(len(self)))]
         part, model = self.parts[index], self.file.model
         lit = tuple(tuple(map(self.file.frame, numbers)) for numbers in part.lit)
-        return FramesJob(
-            part.id, lit, self.shard.frames, self.file.base, model.write, self.versions
-        )
+        about = self.file.base, model.write, self.versions, self.device
+        return FramesJob(part.id, lit, self.shard.frames, *about)
 
 
-def _record(file: DatasetFile, versions: dict[str, str]) -> dict[str, Any]:
+def _record(file: DatasetFile, versions: dict[str, str], device: str) -> dict[str, Any]:
     model = file.model
     whole = {"npz": "shard_NNNN.npz: members FRAME.KIND", "tiff": "shard_NNNN/FRAME_KIND.tif"}
     return {
@@ -259,4 +263,5 @@ def _record(file: DatasetFile, versions: dict[str, str]) -> dict[str, Any]:
             kind: 1 if model.format == "npz" else scale(kind, _scale(file)) for kind in model.write
         },
         "versions": versions,
+        "device": device if device == "cpu" else open_device(device).describe(),
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,24 +12,31 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.config.document import Document
+from vcam_cli.datasets.device_frames import batch_key, device_frames
 from vcam_cli.datasets.drawing import Frame
-from vcam_cli.effects.base import of_kind
+from vcam_cli.devices.choice import open_device
+from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.signal_chain import NoiseSource
 from vcam_cli.errors import BadInput
 from vcam_cli.files.frame_archive import archive_bytes, array_hash
 from vcam_cli.image_formation.rate_cache import RateCache
 from vcam_cli.physics.cache import ByteCache
 from vcam_cli.quality.photon_transfer import ROUNDING
+from vcam_cli.readout.chain import ReadoutChain
+from vcam_cli.readout.exposure import mean_dark
 from vcam_cli.simulation.exposures import exposures, share_light
 from vcam_cli.simulation.photograph import Photograph
 from vcam_cli.simulation.shared import Shared
 from vcam_cli.simulation.simulate import simulate
+from vcam_cli.solve.solved import Solved
 from vcam_cli.sweeps.point_effects import with_every_effect
 from vcam_cli.sweeps.sweep_result import error_cell
 
 LIGHT, PICTURES = 1 << 24, 1 << 28
 """Bytes of light that are kept, since no frame comes back to the scene of an earlier one, and of
 pictures, since other crops of them do."""
+HASHERS = 4
+"""Threads that hash the arrays of a batch."""
 NPZ = "npz"
 """The file of frames beside their point."""
 RECORDS = "records.json"
@@ -66,6 +74,7 @@ class FramesJob:
     """The data set's camera file."""
     write: tuple[str, ...]
     versions: dict[str, str]
+    device: str = "cpu"
 
     def compute(self, threads: int, shared: Shared) -> tuple[dict[str, float], dict[str, bytes]]:
         """Return no metrics, and the archive of the frames' arrays and records."""
@@ -74,8 +83,16 @@ class FramesJob:
         arrays: dict[str, Array] = {}
         records: dict[str, Record] = {}
         known: list[tuple[Frame, Camera]] = []
+        if self.device != "cpu":
+            self._take_batches(arrays, records)
         for frames in self.lit:
-            wanted = [n for n, frame in enumerate(frames) if frame.number in self.numbers]
+            wanted = [
+                n
+                for n, frame in enumerate(frames)
+                if frame.number in self.numbers and str(frame.number) not in records
+            ]
+            if not wanted:
+                continue
             for frame, result in self._results(frames, wanted, known, threads, shared):
                 if isinstance(result, BadInput):
                     records[str(frame.number)] = Record(error=error_cell(result.problems))
@@ -85,6 +102,34 @@ class FramesJob:
                 records[str(frame.number)] = Record(labels(result), hashes)
                 arrays |= {f"{frame.number}.{kind}": values for kind, values in own.items()}
         return {}, {NPZ: archive_bytes(arrays, {RECORDS: write_records(records).encode()})}
+
+    def _take_batches(self, arrays: dict[str, Array], records: dict[str, Record]) -> None:
+        """Add what batches on a device compute of the frames; hashes are made by threads."""
+        device = open_device(self.device)
+        batches: dict[str, list[Frame]] = {}
+        for frame in (frame for frames in self.lit for frame in frames):
+            key = batch_key(frame, self.write)
+            if frame.number in self.numbers and key is not None:
+                batches.setdefault(key, []).append(frame)
+        with ThreadPoolExecutor(HASHERS) as pool:
+            for frames in batches.values():
+                left, hashing = {frame.number for frame in frames}, []
+                try:
+                    taken = device_frames(frames[0], self.write, self.base, device).take(frames)
+                    for frame, taker, raw, clean, seconds, gain in taken:
+                        camera, own = taker.at_gain(gain), {"raw": raw, "clean": clean}
+                        given = camera.solved, camera.chain, camera.effects, seconds, raw
+                        own = {kind: own[kind] for kind in self.write}
+                        hashes = {kind: pool.submit(array_hash, own[kind]) for kind in own}
+                        hashing.append((str(frame.number), noise_labels(*given), hashes))
+                        arrays |= {f"{frame.number}.{kind}": own[kind] for kind in own}
+                        left.discard(frame.number)
+                except BadInput as error:
+                    said = error_cell(error.problems)
+                    records |= {str(number): Record(error=said) for number in left}
+                for name, told, hashes in hashing:
+                    known = {kind: found.result() for kind, found in hashes.items()}
+                    records[name] = Record(told, known)
 
     def _results(
         self,
@@ -112,7 +157,7 @@ class FramesJob:
                 if number in wanted:
                     yield frame, error
         rest = [number for number in wanted if number in cameras]
-        if rest and all(map(share_light, cameras.values())):
+        if rest and self.device == "cpu" and all(map(share_light, cameras.values())):
             order = list(cameras)
             places = [order.index(number) for number in rest]
             try:
@@ -123,7 +168,7 @@ class FramesJob:
         for number in rest:
             try:
                 every = with_every_effect(cameras[number])
-                yield frames[number], simulate(every, threads, shared=shared)
+                yield frames[number], simulate(every, threads, shared=shared, device=self.device)
             except BadInput as error:
                 yield frames[number], error
 
@@ -153,26 +198,34 @@ def labels(result: Photograph) -> dict[str, float]:
     The temporal variance of a pixel is dark_variance + system_gain (clean - black_level), as long
     as it does not saturate and its signal chain is linear.
     """
-    frame, circuit = result.frame, result.frame.electrical
-    gain = frame.chain.system_gain
-    dark = frame.dark_rate * frame.exposure_time
-    sources = of_kind(frame.plan.active, NoiseSource)
+    frame = result.frame
+    running = frame.plan.active
+    return noise_labels(frame.solved, frame.chain, running, frame.exposure_time, result.dn)
+
+
+def noise_labels(
+    solved: Solved, chain: ReadoutChain, effects: tuple[Effect, ...], seconds: float, dn: Array
+) -> dict[str, float]:
+    """Return the labels of a frame: a camera at its gain, exposure time [s], its codes dn."""
+    circuit, gain = solved.electrical, chain.system_gain
+    dark = mean_dark(seconds, effects)
+    sources = of_kind(effects, NoiseSource)
     rms = {f"{source.name} [e]": source.variance(dark, dark) ** 0.5 for source in sources}
     temporal = sum(s.variance(dark, dark) for s in sources if s.scope == "frame")
-    fpn = frame.solved.pixel.fpn
+    fpn = solved.pixel.fpn
     return {
-        "exposure_time [s]": frame.exposure_time,
+        "exposure_time [s]": seconds,
         "exposure_gain": circuit.exposure_gain,
         "system_gain [DN/e]": gain,
-        "black_level [DN]": frame.black_dn,
-        "saturation [DN]": frame.chain.saturated_dn,
+        "black_level [DN]": chain.black_dn(dark),
+        "saturation [DN]": chain.saturated_dn,
         "full_well [e]": circuit.full_well,
         "dark_signal [e]": dark,
         "dark_variance [DN2]": gain**2 * temporal + ROUNDING,
         **rms,
         **{
             f"{what}.{branch.name}{unit}": value
-            for branch in frame.chain.branches
+            for branch in chain.branches
             for what, unit, value in (
                 ("system_gain", " [DN/e]", 1 / branch.circuit.electrons_per_dn),
                 ("offset", " [DN]", branch.circuit.offset),
@@ -181,6 +234,6 @@ def labels(result: Photograph) -> dict[str, float]:
         },
         "gain_pixel": fpn.gain_pixel or 0.0,
         "gain_column": fpn.gain_column or 0.0,
-        "mean [DN]": float(result.dn.mean(dtype=float)),
-        "saturated_fraction": float(np.mean(result.dn >= frame.chain.saturated_dn)),
+        "mean [DN]": float(dn.mean(dtype=float)),
+        "saturated_fraction": float(np.mean(dn >= chain.saturated_dn)),
     }

@@ -18,20 +18,24 @@ from vcam_cli.datasets.shards import Part, Shard
 from vcam_cli.files.report import hash_file, hash_text, to_json
 from vcam_cli.sweeps.sweep_points import hash_of
 
-PART_PIXELS = 1 << 20
-"""Pixels of a part, at most: a second of work. A single light may have more."""
+PART_PIXELS, DEVICE_PIXELS = 1 << 20, 1 << 24
+"""Pixels of a part, at most: a second of work of the processor, and a batch of a graphics
+processor. A single light may have more."""
 
 
 class Hasher:
     """Hashes parts: all that their arrays depend on, wherever files lie."""
 
-    def __init__(self, file: DatasetFile) -> None:
+    def __init__(self, file: DatasetFile, device: str = "cpu") -> None:
         form = file.camera.model_dump(mode="json")
         for name in ("name", "quality", "expect", "output", "seed"):
             form.pop(name, None)
         form["sensor"] = file.camera.seed.sensor
         self._file = file
-        self._content = hash_of(file.camera, form, {"write": sorted(file.model.write)})
+        asked = {} if device == "cpu" else {"device": device}
+        self._content = hash_of(file.camera, form, asked | {"write": sorted(file.model.write)})
+        self.most_pixels = PART_PIXELS if device == "cpu" else DEVICE_PIXELS
+        """Pixels of a part, at most."""
         self._scenes = {s.file: hash_file(s.file) for s in file.scenes if s.file is not None}
 
     def part(self, lit: tuple[range, ...], numbers: tuple[int, ...]) -> Part:
@@ -62,7 +66,7 @@ def cut(file: DatasetFile, hasher: Hasher) -> list[Shard]:
 
 def _parts(file: DatasetFile, frames: range, pixels: int, hasher: Hasher) -> Iterator[Part]:
     """Yield the parts of a shard of these frames."""
-    most = max(1, min(MOST_TOGETHER, PART_PIXELS // pixels))
+    most = max(1, min(MOST_TOGETHER, hasher.most_pixels // pixels))
     lit: list[range] = []
     numbers: list[int] = []
     for lights in _by_scene(file, frames, pixels):
