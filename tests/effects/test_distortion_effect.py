@@ -10,6 +10,7 @@ from moving_waves import COLUMNS, IMAGE, PITCH, ROWS
 
 from vcam_cli import load, plan, simulate
 from vcam_cli.errors import BadInput
+from vcam_cli.image_formation import warps
 
 SPACING = 50e-6
 """Of the points [m]: 10 pixels. Their diameter is 4.241 pixels, where J1(pi d) is 0: so pixels that
@@ -107,6 +108,30 @@ def test_lateral_color_moves_points_by_their_mean_magnification(tmp_path):
     expected = grid() * (1 + mean)
     found = centers(seen(tmp_path, light), expected)
     assert np.abs(found - expected).max() < PIXEL
+
+
+def test_lateral_color_that_groups_would_miss_takes_every_wavelength(tmp_path, monkeypatch):
+    """Each has an image of its own, and their sum is that of groups within the tolerance."""
+    light = {
+        "scene.illuminant": "equal-energy",
+        "scene.wavelengths": {"start": "500 nm", "stop": "600 nm"},
+        "optics.lateral_color": {"table": {500: "0 %", 600: "0.3 %"}},
+    }
+    grouped = seen(tmp_path, light)
+    images = []
+    form = warps.image_layers
+
+    def counted(path, scene):
+        images.append(path.transfer.wavelengths)
+        return form(path, scene)
+
+    monkeypatch.setattr(warps, "image_layers", counted)
+    monkeypatch.setattr(warps.GroupError, "rms", lambda *_: np.inf)
+    every = seen(tmp_path, light)
+    assert {len(own) for own in images} == {1}
+    assert len(images) == len(np.unique(np.concatenate(images))) > 10
+    error = np.sqrt(np.mean((every - grouped) ** 2)) / every.max()
+    assert 0 < error <= 5e-3
 
 
 def test_the_measured_lens_shows_what_was_measured(tmp_path):
