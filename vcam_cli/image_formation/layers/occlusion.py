@@ -52,8 +52,6 @@ Sums = tuple[Array, Array, Array]
 Seen = Callable[[Iterable[Sums]], tuple[Array, Array]]
 """What makes of groups of rays the means over all of them in every color at the pixels:
 (n, C, rows, columns) and (m, C, rows, columns)."""
-Compose = Callable[[Sequence[Planes]], Array]
-"""What makes light (C, h, w) of layers, the nearest first."""
 
 
 @dataclass(frozen=True)
@@ -164,7 +162,6 @@ def covariance(
     groups: Sequence[Array],
     reach: tuple[int, int],
     seen: Seen,
-    compose: Compose = front_to_back,
 ) -> Array:
     """Return what the product of the layers' means lacks, at the pixels.
 
@@ -178,8 +175,6 @@ def covariance(
         Rows and columns of cells at each border that only rays from elsewhere meet.
     seen : callable
         What lens, silicon and photodetectors make of images on the inner cells.
-    compose : callable, optional
-        What puts the layers one before the other; it does not use the last one's opacity.
 
     Returns
     -------
@@ -201,7 +196,7 @@ def covariance(
                 top, left = reach[0] + own[number, 1], reach[1] + own[number, 0]
                 part = layer.planes[:, top : top + rows, left : left + columns]
                 met.append((part[:-1], part[-1]))
-            light[0] += compose(met)
+            light[0] += front_to_back(met)
             for sums, (own_light, _) in zip(light[1:], met, strict=True):
                 sums += own_light
             for sums, (_, opacity) in zip(cover, met[:-1], strict=True):
@@ -210,4 +205,4 @@ def covariance(
 
     (together, *alone), covers = seen(map(summed, groups))
     means = list(zip(alone, [*covers, np.ones_like(together)], strict=True))
-    return np.asarray(together - compose(means))
+    return np.asarray(together - front_to_back(means))

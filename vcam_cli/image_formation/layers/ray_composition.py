@@ -4,6 +4,9 @@ The rays through one point u of the aperture see each layer sharp, displaced by 
 times u. Composed so and averaged over u, layers hide each other exactly; composed of their means
 they do not. The difference is as smooth as the layers out of focus are blurred, so it is summed up
 on cells about as coarse as that, and only near samples that hide something.
+
+Layers of a scene are summed by `ray_windows.py`: their opacities multiply, and shares of a surface
+add up. A slope in 16 layers errs by 0.07 % of full signal here, and by 10.5 % front to back.
 """
 
 from __future__ import annotations

