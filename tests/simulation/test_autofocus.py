@@ -195,3 +195,55 @@ def test_of_a_plateau_it_finds_the_inside(middle):
     found = autofocus.golden_section(flat_top, -1.0, 1.0)
     assert abs(found - middle) < 0.08
     assert len(tried) <= 2 + autofocus.FINE
+
+
+PHASE = EDGE | {
+    "scene.source": {"kind": "chart", "chart": "siemens-star"},
+    "array.rows": 96,
+    "array.columns": 128,
+    "pixel.phase_detection": "dual",
+}
+MASKED = {
+    "pixel.phase_detection": {"masked": {"period": [2, 2]}},
+    "scene.source": {"kind": "chart", "chart": "slanted-edge"},
+    "array.columns": 256,
+}
+
+
+@pytest.mark.parametrize(
+    ("defocus", "changes"),
+    [
+        ("40 um", {}),
+        ("-60 um", {}),
+        ("40 um", {"array.pattern": "bayer-rggb", "scene.illuminant": "D65"}),
+        ("-40 um", {"pixel.phase_detection": {"dual": {"separation": "60 %"}}}),
+        ("60 um", MASKED),
+    ],
+)
+def test_half_images_tell_where_it_is_sharp(defocus, changes, tmp_path):
+    """Within a fiftieth of a pixel of disparity: 0.05 pixels of blur, 0.6 um of 12 um of focus; and
+    a few trials on both sides, where contrast takes 18. Pixels masked on one side lie
+    four columns apart, and alias: within the depth of focus."""
+    made = camera(tmp_path, PHASE | {"optics.defocus": defocus} | changes)
+    ready, notes = prepare(made)
+    assert any("by phase" in note for note in notes)
+    assert abs(ready.camera.optics.defocus) < (DEPTH if changes is MASKED else 1e-6)
+
+
+def test_a_distance_that_is_not_focused_is_found_by_phase(tmp_path):
+    """A lens focused at 2 m before a scene at 1 m: the image plane goes f^2 (1/1 - 1/2) away."""
+    near = PHASE | {"optics.focus_distance": "2 m", "scene.distance": "1 m"}
+    ready, notes = prepare(camera(tmp_path, near))
+    assert any("by phase" in note for note in notes)
+    f = 5e-3
+    expected = f * 1 / (1 - f) - f * 2 / (2 - f)
+    assert ready.camera.optics.defocus == pytest.approx(-expected, abs=1e-6)
+
+
+def test_level_lines_tell_no_phase_and_contrast_takes_over(tmp_path):
+    lines = {"kind": "chart", "chart": "sinusoid", "frequency": "30 lp/mm", "orientation": "90 deg"}
+    source = lines | {"contrast": 0.8, "mean": 0.5}
+    made = camera(tmp_path, PHASE | {"scene.source": source, "optics.defocus": "25 um"})
+    ready, notes = prepare(made)
+    assert any("focus: auto moves" in note and "by phase" not in note for note in notes)
+    assert abs(ready.camera.optics.defocus) < DEPTH

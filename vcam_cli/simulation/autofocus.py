@@ -1,10 +1,16 @@
-"""Autofocus by contrast, offline: the image plane is moved to where the picture is sharpest.
+"""Autofocus, offline: the image plane is moved to where the picture is sharpest.
 
-The lens is tried at places of the image plane, first widely apart, then between the best ones; what
-is judged is the noise-free light in a window of the array, as the pixels see it: the mean square
-of the differences between neighbors of one color, relative to the squared mean; of pixels at places
-of their own, the variance of each color. Lens aberrations, the scene's detail and the pixels'
-aperture so have their say in what is sharpest.
+By phase, where pixels tell the halves of the lens apart: half images lie beside each other by 4 /
+(3 pi) of the blur's diameter, which says how far the image plane is off, and on which side.
+
+    move = -(3 pi / 4) N disparity,   disparity on the sensor, N the working f-number
+
+A few such moves reach the best place. Else, or where half images tell nothing, by contrast: the
+lens is tried at places of the image plane, first widely apart, then between the best ones; what is
+judged is the noise-free light in a window of the array, as the pixels see it: the mean square of
+the differences between neighbors of one color, relative to the squared mean; of pixels at places of
+their own, the variance of each color. Lens aberrations, the scene's detail and the pixels' aperture
+so have their say in what is sharpest. By phase, aberrations other than defocus have none.
 
 References
 ----------
@@ -14,6 +20,7 @@ magnitude as criterion function; search of its maximum).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -21,7 +28,9 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.optics import FocusWindow
 from vcam_cli.errors import BadInput, bad
+from vcam_cli.image_formation.half_images import sites
 from vcam_cli.progress import Stages
+from vcam_cli.quality.disparity import disparity
 from vcam_cli.simulation.cost_model import light_seconds
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.solve.solved import Solved
@@ -37,6 +46,16 @@ TRIALS = COARSE + 2 + FINE
 TOLERANCE = 1e-3
 """Of the trials, relative to full signal: near the best place the contrast hardly changes."""
 GOLDEN = (np.sqrt(5) - 1) / 2
+MOVES = 6
+"""Moves by phase, at most: half images of another shape than each other tell less at first."""
+LEAST_DETAIL = 4e-4
+"""Gradient of the light along rows, over its mean, of which the fivefold tells something: twice the
+tolerance of the trials."""
+SEEN = 0.02
+"""Disparity that counts as none, over the distance of pixels of one half: half images tell it so
+exactly."""
+MOST = 24
+"""Largest disparity that is looked for [blocks of colors]."""
 LEAST_GAIN = 1e-3
 """Relative gain in contrast below which nothing in the scene tells where it is sharp."""
 
@@ -82,7 +101,8 @@ def focused(
         raise bad("optics.focus", f"{what} not to be focused", "write focus: fixed")
     with stages("autofocus"):
         trials = _Trials(camera, prepare, workers, stages)
-        place, notes = _search(camera, trials)
+        found = None if camera.pixel.phase_detection is None else _by_phase(camera, trials)
+        place, notes = found or _search(camera, trials)
         return camera.focused_at(place), notes, trials.seconds
 
 
@@ -97,16 +117,45 @@ class _Trials:
         self.seconds = 0.0
         """Estimated time of the trials so far [s]."""
 
+    def disparity(self, shift: float) -> float | None:
+        """Return that of the half images with the image plane at a place [pixels], if any."""
+        ready = self._ready(shift)
+        return None if ready is None else phase_disparity(ready, self._window)
+
     def sharpness(self, shift: float) -> float:
         """Return the contrast with the image plane at a place [m]."""
+        ready = self._ready(shift)
+        return 0.0 if ready is None else _contrast_of_pixels(ready, self._window)
+
+    def _ready(self, shift: float) -> Prepared | None:
+        """Return the camera with its image plane at a place [m]; None far from sharp."""
         self._stages.watch.step(self._count, TRIALS)
         self._count += 1
         try:
             ready = self._prepare(self._camera.focused_at(shift))
         except BadInput:  # a wavefront too steep to be followed: far from sharp
-            return 0.0
-        self.seconds += light_seconds(ready.layout, ready.spectrum, self._workers)
-        return _contrast_of_pixels(ready, self._window)
+            return None
+        halves = 1 if ready.halves is None else 3
+        self.seconds += halves * light_seconds(ready.layout, ready.spectrum, self._workers)
+        return ready
+
+
+def _by_phase(camera: Solved, trials: _Trials) -> tuple[float, tuple[str, ...]] | None:
+    """Return the place that half images tell [m], and notes; None where they tell nothing."""
+    phase, solved = camera.pixel.phase_detection, camera.geometry
+    assert phase is not None
+    start = place = camera.optics.defocus
+    per_pixel = 3 * math.pi / 4 * solved.working_f_number * solved.pitch_x / phase.separation
+    seen = SEEN * (1 if phase.masked is None else 2 * phase.masked.period[1])
+    for _ in range(MOVES):
+        found = trials.disparity(place)
+        if found is None:
+            return None
+        if abs(found) < seen:
+            moved = (place - start) * 1e6
+            return place, (f"focus: auto moves the image plane by {moved:+.4g} um, by phase",)
+        place -= per_pixel * found
+    return None
 
 
 def _search(camera: Solved, trials: _Trials) -> tuple[float, tuple[str, ...]]:
@@ -125,6 +174,52 @@ def _search(camera: Solved, trials: _Trials) -> tuple[float, tuple[str, ...]]:
     if best in (0, COARSE - 1):
         note += ", the end of its range: the lens may be out of focus still"
     return found, (note,)
+
+
+def phase_disparity(ready: Prepared, window: FocusWindow) -> float | None:
+    """Return how far the half images of a camera lie beside each other in a window.
+
+    Parameters
+    ----------
+    ready : Prepared
+        Camera that tells the halves of its lens apart.
+    window : FocusWindow
+        The window.
+
+    Returns
+    -------
+    float or None
+        Position in the left image less that in the right, the median over the window, without
+        noise [pixels]; None where the light has no detail along rows.
+    """
+    phase = ready.solved.pixel.phase_detection
+    if ready.halves is None or phase is None:
+        return None
+    if phase.masked is not None:
+        left, right = (half[at] for half, at in zip(ready.halves, sites(phase.masked), strict=True))
+        apart, offset = 2 * phase.masked.period[1], 0.5  # right pixels lie half a step beside left
+    else:
+        block = ready.mosaic.block
+        left, right = (_block_sums(half, len(block), len(block[0])) for half in ready.halves)
+        apart, offset = len(block[0]), 0.0
+    columns = min(left.shape[1], right.shape[1])
+    rows, across = window.slices(left.shape[0], columns)
+    wider = slice(max(across.start - MOST, 0), across.stop + MOST)
+    seen = [half[rows, :columns][:, wider].astype(np.float64) for half in (left, right)]
+    level = seen[0].mean() + seen[1].mean()
+    if level <= 0:
+        return None
+    found = disparity(seen[0], seen[1], MOST, (LEAST_DETAIL * level) ** 2)
+    inside = found[:, across.start - wider.start :][:, : across.stop - across.start]
+    told = inside[np.isfinite(inside)]
+    return float(np.median(told) - offset) * apart if told.size else None
+
+
+def _block_sums(light: Array, height: int, width: int) -> Array:
+    """Return the sums over blocks of colors (rows / height, columns / width)."""
+    rows, columns = (n - n % size for n, size in zip(light.shape, (height, width), strict=True))
+    whole = light[:rows, :columns].reshape(rows // height, height, columns // width, width)
+    return np.asarray(whole.sum(axis=(1, 3)))
 
 
 def _contrast_of_pixels(ready: Prepared, window: FocusWindow) -> float:
