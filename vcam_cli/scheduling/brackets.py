@@ -138,7 +138,7 @@ def optimal_bracket(
     Raises
     ------
     ValueError
-        If the exposures do not fit into the time.
+        If the exposures do not fit.
     """
     first = first_capture_time(pdf, sensor, constraints)
     room = total - first - (count - 1) * constraints.least_gap
@@ -147,7 +147,7 @@ def optimal_bracket(
         least = constraints.frame_time
         if room < (count - 1) * least * (1 - SLACK) or room <= 0:
             message = f"{count} exposures one after the other do not fit {total:.4g} s"
-            raise ValueError(f"{message}; write fewer, or leave out the method bracket")
+            raise ValueError(f"{message}; write a smaller count, or leave out the method bracket")
         values = _Values(pdf, sensor, constraints.frame_time, room)
         others = max(
             (_exchanged(start, values, room) for start in _starts(values, count - 1, room, first)),
@@ -195,7 +195,7 @@ class _Values:
         return float(sum(self.at(float(time)) for time in times))
 
     def between(self, low: float, high: float) -> Floats:
-        """Return times from low to high; whole frames where exposures take whole frames."""
+        """Return times from low to high, whole frames where required."""
         times = np.linspace(low, high, REFINED)
         if self.frame:
             times = np.unique(np.round(times / self.frame)) * self.frame
@@ -280,7 +280,7 @@ def _best_pair(one: float, other: float, total: float, values: _Values) -> tuple
         return values.at(time) + values.at(left) if left > 0 else -np.inf
 
     grid = values.times[values.times < total]
-    # The other may saturate later than on the grid: the rest of its time is examined, too.
+    # The other may saturate later than on the grid: the remaining time is a candidate, too.
     mirrored = np.array([rest(t) for t in grid])
     found = np.unique(np.concatenate([grid, mirrored[mirrored > 0], [one, other]]))
     best = float(found[int(np.argmax([worth(float(t)) for t in found]))])
