@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 import pytest
+from making import camera as camera_of
 
-from vcam_cli import load
+from vcam_cli import load, simulate
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.derived.prescription import sensor_view, traced_lens
 from vcam_cli.effects.optics.aberration import Aberration
@@ -160,3 +161,19 @@ def test_mistakes_are_said_with_a_remedy(change, said):
         checked(PHONE, [change])
     assert said in str(error.value)
     assert "optics" in str(error.value)
+
+
+def test_a_run_notes_what_it_ignores_and_its_report_has_the_lens(tmp_path):
+    from lenses.test_lens_files import HEAD, SURFACES
+
+    file = tmp_path / "lens.zmx"
+    file.write_text(HEAD + "VDXN 0 0.1\n" + SURFACES, encoding="utf-8")
+    lens = {"prescription": {"file": str(file), "f_number": 16, "scale": 0.05}}
+    model = camera_of(
+        tmp_path, {"optics": lens, "scene.distance": "infinity", "output.report": True}
+    )
+    found = simulate(model, workers=1)
+    ignored = [note for note in found.notes if "vignetting factors are ignored" in note]
+    assert len(ignored) == 1
+    found.save(tmp_path / "out")
+    assert "Traced lens" in (tmp_path / "out" / "report.html").read_text("utf-8")

@@ -61,6 +61,15 @@ class LensPage:
     """Paraxial focus at `wavelengths` behind that at the primary one (W,)."""
 
 
+def is_traced(solved: Solved) -> bool:
+    """Return whether a camera's lens is given by its surfaces."""
+    return bool(_traced(solved))
+
+
+def _traced(solved: Solved) -> tuple[TracedBlur, ...]:
+    return of_kind((e for e in solved.effects.found.values() if e is not None), TracedBlur)
+
+
 def lens_page(solved: Solved) -> LensPage:
     """Return the figures of a solved camera's lens.
 
@@ -79,7 +88,7 @@ def lens_page(solved: Solved) -> LensPage:
     BadInput
         For a camera whose lens is not given by its prescription, or forms no image.
     """
-    traced = of_kind((e for e in solved.effects.found.values() if e is not None), TracedBlur)
+    traced = _traced(solved)
     if not traced:
         message = "is drawn only from its surfaces"
         remedy = "write optics: {prescription: double-gauss}; `vcam list lenses` shows what ships"

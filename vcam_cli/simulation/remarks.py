@@ -13,6 +13,7 @@ from vcam_cli.camera.processing import SHOWN
 from vcam_cli.camera.scene.scene_files import ImageFile
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES
 from vcam_cli.effects.base import of_kind
+from vcam_cli.effects.optics.traced_blur import TracedBlur
 from vcam_cli.effects.pixel_signal import ColumnSpread, Overflow
 from vcam_cli.effects.signal_chain import SIGMAS
 from vcam_cli.effects.warps import ImageMotion
@@ -105,6 +106,7 @@ def remarks(ready: Prepared) -> tuple[str, ...]:
         *_colors_of_picture(ready),
         *_cropped(ready),
         *_sampled(ready),
+        *_prescription(ready),
         *_motion(ready),
         *_depth(ready),
         *_edge_without_blur(ready),
@@ -126,6 +128,12 @@ def remarks(ready: Prepared) -> tuple[str, ...]:
 def _picture(ready: Prepared) -> AnyScene:
     """Return the scene; of a picture with depth the picture."""
     return ready.scene.flat if isinstance(ready.scene, DepthScene) else ready.scene
+
+
+def _prescription(ready: Prepared) -> tuple[str, ...]:
+    """Return what the file of a traced lens says and the simulation ignores."""
+    found = (effect for effect in ready.solved.effects.found.values() if effect is not None)
+    return tuple(note for blur in of_kind(found, TracedBlur) for note in blur.view.lens.remarks)
 
 
 def _blind_colors(ready: Prepared) -> tuple[str, ...]:

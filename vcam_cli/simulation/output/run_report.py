@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from vcam_cli.files import atomic
 from vcam_cli.files.report import to_json
 from vcam_cli.processing import tone
 from vcam_cli.quality.error_map import scale_limit
@@ -21,7 +22,9 @@ from vcam_cli.reports import page, pictures
 from vcam_cli.reports.page import Facts, Page, Part, Picture, Section, Table, Text
 from vcam_cli.reports.run_facts import exposure_rows, geometry_rows, metric_rows, spoken
 from vcam_cli.simulation.frame import Frame
+from vcam_cli.simulation.lens_page import is_traced, lens_page
 from vcam_cli.simulation.output import report_plots
+from vcam_cli.simulation.output.lens_plot import plot_lens
 from vcam_cli.simulation.photograph import Photograph, needs_picture
 
 GROUP = "frame"
@@ -74,6 +77,7 @@ def report(result: Photograph, record: Mapping[str, Any]) -> Page:
             Section("Plan", [_plan(record)], _plan_text(record)),
             Section("Noise and codes", list(_noise(frame))),
             Section("Light and sharpness", list(_light(frame))),
+            Section("Lens", list(_lens(frame))),
             Section("Provenance", list(_provenance(record))),
         ),
     )
@@ -132,6 +136,17 @@ def _raw(result: Photograph) -> Iterator[Part]:
     yield Picture("Raw frame", raw, f"Raw codes of {frame.solved.name} as shades of gray",
                   f"{about} {note}".strip(), group=GROUP,
                   far=pictures.without_mosaic(shown) if is_mosaic else "")  # fmt: skip
+
+
+def _lens(frame: Frame) -> Iterator[Part]:
+    """Yield the page of a lens that is traced."""
+    if not is_traced(frame.solved):
+        return
+    found = lens_page(frame.solved)
+    drawn = atomic.written_bytes("lens.png", lambda path: plot_lens(path, found))
+    title = f"Rays, spots, MTF and colors of {found.title}"
+    about = "From the center to the corner of the array; vcam plan --lens writes the numbers."
+    yield Picture("Traced lens", pictures.png(drawn), title, about)
 
 
 def _steps(frame: Frame) -> str:
