@@ -285,6 +285,11 @@ class FieldTransfer(Effect):
         """
         return self.rings(count)
 
+    @property
+    def table_seconds(self) -> float:
+        """Core seconds of what its transfers are looked up in, made once."""
+        return 0.0
+
     def magnifying(self, warps: Sequence[Magnification]) -> FieldTransfer | None:
         """Return the blur with magnifications by wavelength in it, which then need no warps.
 

@@ -270,6 +270,8 @@ class SpectrumReport:
     """Times that the spectrum was filtered: for each parity, and for each mode of the field."""
     has_field: bool = False
     """Whether a blur changes over the field."""
+    field_seconds: float = 0.0
+    """Core seconds of what that blur is looked up in [s]."""
     is_sheared: bool = False
     """Whether each row sees the image at another place, as a rolling shutter in motion does."""
     sub_exposures: int = 0

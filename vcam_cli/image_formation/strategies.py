@@ -249,6 +249,7 @@ def _spectral_layers(
         far_cells=sum(math.prod(part.scene.shape) for part in rings),
         far_filters=len(tables.parities) * (len(rings) + len(modes) * followed),
         has_field=path.field is not None,
+        field_seconds=path.field.table_seconds if path.field else 0.0,
         is_sheared=any(path.drift),
         terms=image_filter.terms,
         planes=len(tables.mix),

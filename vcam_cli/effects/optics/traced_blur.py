@@ -52,6 +52,8 @@ STEPS_PER_PERIOD = 16.0
 six entries err by 2e-5 of the light that falls there."""
 STENCIL = 6
 """Entries of such a table through which a polynomial goes."""
+GRID_SAMPLE = 35e-9
+"""One sample of a padded pupil through its transforms, and harmonics from its grid [s]."""
 RAYS = 48
 """Rays across a pupil where they are traced without diffraction."""
 
@@ -248,6 +250,12 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
                 self.kept[wavelength] = kept
             return kept
 
+    @property
+    def samples(self) -> int:
+        """Samples of its pupil, padded, at all wavelengths of its grids."""
+        across = shaped_pupil.samples_across(self.wavefront.slope / self.shortest)
+        return len(self._nodes) * (2 * across) ** 2
+
     @cached_property
     def _mask(self) -> shaped_pupil.Mask:
         return self.wavefront.mask(
@@ -309,6 +317,14 @@ class TracedBlur(AberrationBlur, FieldTransfer):
         return (
             f"{self.view.lens.name}, traced: center {center.describe()}; corner {corner.describe()}"
         )
+
+    @property
+    def table_seconds(self) -> float:
+        """Core seconds of the grids of all places and wavelengths."""
+        if not self.diffracts:
+            return 0.0
+        places = self._places(FEWEST_PLACES)
+        return GRID_SAMPLE * sum(place.samples for place in places)
 
     @property
     def _color(self) -> WavelengthTable:

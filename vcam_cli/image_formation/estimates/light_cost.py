@@ -72,7 +72,7 @@ RAY = 12e-9
 LOOK_UP = 3e-9
 """One value of a layer that a ray looks up, painted and composed [s]."""
 
-WARPED = 0.3e-6
+WARPED = 0.35e-6
 """One cell of one plane of a chart looked up where a warp sees it, painted and averaged [s]."""
 
 DIRECTED = 4
@@ -86,6 +86,8 @@ PARITIES, MODES = 4, 4
 FIELD = 0.16
 """Finding the modes of a blur over the field up to the Nyquist frequency of the pixels, and by its
 square up to another [s]."""
+MODE = 50e-9
+"""One pixel of one further mode of the field: its map, and what its direction costs [s]."""
 SHEARED = 3
 """Cost of pixels whose rows see the scene at other places over that of others."""
 ENTRIES_OF_PLANE = 150
@@ -149,6 +151,8 @@ def _flat_seconds(geometry: Geometry, colors: int, report: SpectrumReport) -> fl
         + EVALUATE * report.filters * values * (SHEARED if report.is_sheared else 1)
         + FAR * report.far_filters * values
         + FIELD * report.oversampling**2 * report.has_field
+        + report.field_seconds
+        + MODE * (report.filters - 1) * geometry.rows * geometry.columns * report.has_field
         + (SAMPLE + PAINT) * report.far_cells * report.planes
         + TERM * colors * report.far_filters * report.planes * cells_of_part
         + TABLE * report.table_values
@@ -255,6 +259,7 @@ def expected_report(
         far_filters=filters * found.far_filters,
         table_values=ENTRIES_OF_PLANE**2 * planes * directed,
         has_field=path.field is not None,
+        field_seconds=path.field.table_seconds if path.field else 0.0,
         is_sheared=any(path.drift),
     )
 
