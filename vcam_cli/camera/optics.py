@@ -408,7 +408,7 @@ def _measured_alone(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
 
 
 def _shaped_alone(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
-    """Refuse effects that are not simulated through a shaped aperture."""
+    """Refuse beside a shaped aperture keys that are not simulated through one."""
     if given.get("aperture") in (None, "circle"):
         return
     for name in ("prescription", "psf", "mtf"):

@@ -63,7 +63,8 @@ def check(camera: CameraModel) -> None:
         key = "prescription" if optics.prescription else key
         raise bad(
             ("optics", key),
-            "scenes with depth or layers are not simulated through a lens that distorts",
+            "scenes with depth or layers are not simulated through a lens that distorts: their"
+            " opacities are known on rectangular samples, which distortion would bend",
             "remove it, or use a flat scene: a chart, an image or a hyperspectral file",
         )
     x, y = (side / solved.image_distance for side in border(solved))
