@@ -74,7 +74,7 @@ def report_arguments(found: Characterization) -> dict[str, Any]:
     captions = {
         "characterize.csv": "Measured values beside those of the camera file.",
         "photon_transfer.png": "Temporal variance over the mean; the slope is the system gain K",
-        "snr.png": "Signal over temporal noise over the photons on a pixel, with the model",
+        "snr.png": "Temporal SNR over the luminous exposure of the sensor, with the model",
         "linearity.png": "Mean over photons, and the deviation from a straight line",
         "merged_snr.png": "SNR of all readouts merged, with the model; one by one they saturate",
         "merged_snr.csv": "SNR of all readouts merged, measured and expected.",
