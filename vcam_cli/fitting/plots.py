@@ -8,7 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
-from vcam_cli.files.plots import COLORS, DASHES, INK, MARKERS, SMALL, plot_figure
+from vcam_cli.files.plots import (
+    COLORS,
+    DASHES,
+    INK,
+    MARKERS,
+    SMALL,
+    channel_series,
+    color_of,
+    plot_figure,
+)
 from vcam_cli.fitting.parameters import Parameter
 from vcam_cli.fitting.result import Fit
 from vcam_cli.quality.photon_transfer import GAIN_RANGE
@@ -32,9 +41,10 @@ def draw_photon_transfer(path: Path, found: Fit) -> None:
     """Draw temporal variance over signal for every color and light, and the line of the gain."""
     with plot_figure(path, (5.4, 3.6)) as figure:
         axes = figure.subplots()
+        channels = channel_series([curve.color for curve in found.curves])
         for number, curve in enumerate(found.curves):
             series = curve.result.series
-            color = COLORS[number % len(COLORS)]
+            color = color_of(channels[number])
             variance = series.variance - series.dark_variance
             name = f"{curve.color}, {curve.light}"
             marker = MARKERS[number % len(MARKERS)]
