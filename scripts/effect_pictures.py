@@ -84,7 +84,7 @@ EXAMPLES = {
     ),
     "motion": Example(
         (*_chart("eye-chart"), *GRAY, "scene.camera_motion={pan: 60 deg/s}", "exposure.time=5 ms"),
-        "A camera that is turned by 0.3 degrees while it exposes.",
+        "The camera rotates by 0.3 degrees during the exposure.",
     ),
     "jitter": Example(
         (*_chart("siemens-star"), *GRAY, "scene.camera_motion={jitter: 1 px}"),
@@ -102,7 +102,7 @@ EXAMPLES = {
             "pixel.photodetector.fill_factor=1",
             "optics.f_number=1.4",
         ),
-        "Without it every pixel takes the light of one point, and fine spokes alias at full"
+        "Without it every pixel samples one point, and fine spokes alias at full"
         " contrast; photodetectors of the pixel's whole width average over them.",
     ),
     "charge_diffusion": Example(
@@ -115,7 +115,7 @@ EXAMPLES = {
             "pixel.photodetector.charge_diffusion="
             "{diffusion_length: 50 um, depletion_width: 1 um, substrate_depth: 10 um}",
         ),
-        "Red light is absorbed deep in the silicon; its charge wanders to the neighbors.",
+        "Red light is absorbed deep in the silicon; its charge diffuses to the neighbors.",
     ),
     "distortion": Example(
         (*_chart("colorchecker"), "optics.distortion={k1: -4.5}"),
@@ -130,7 +130,7 @@ EXAMPLES = {
     ),
     "off_axis": Example(
         (*WALL, "optics.focal_length=0.4 mm", "exposure.time=3 ms"),
-        "An even wall through a lens of 90 degrees from corner to corner.",
+        "A uniform wall through a lens of 90 degrees from corner to corner.",
     ),
     "stray_light": Example(
         (*_chart("eye-chart"), *GRAY, "optics.stray_light=0.15"),
@@ -145,7 +145,7 @@ EXAMPLES = {
             "pixel.stack={passivation: {thickness: 0.7 um, index: 2.0},"
             " oxide: {thickness: 6 um, index: 1.46}}",
         ),
-        "An even wall: toward the border light meets the walls of the tunnels above the"
+        "A uniform wall: toward the border light meets the walls of the tunnels above the"
         " photodetectors.",
     ),
     "microlens": Example(
@@ -156,7 +156,7 @@ EXAMPLES = {
             "optics.off_axis=none",
             "pixel.microlens={gain: 1.8, shift: optimal}",
         ),
-        "An even wall: 1.8 times the light on the same photodetectors.",
+        "A uniform wall: 1.8 times the light on the same photodetectors.",
     ),
     "flicker": Example(
         (
@@ -235,7 +235,7 @@ EXAMPLES = {
         "Offsets from a file, here rings of 8 electrons rms, the same in every frame.",
     ),
     "reset_noise": Example(
-        _noise("pixel.readout.reset_noise=12 e"), "12 electrons rms of uncertain reset."
+        _noise("pixel.readout.reset_noise=12 e"), "12 electrons rms of reset noise."
     ),
     "read_noise": Example(
         _noise("pixel.readout.read_noise=8 e", "pixel.readout.row_noise=4 e"),
@@ -254,11 +254,12 @@ EXAMPLES = {
         "3 % of the pixels have a trap that shifts them by 30 electrons.",
     ),
     "adc_noise": Example(
-        _noise("adc.noise=3 DN"), "An ADC of 3 DN rms: noise that no gain in front of it raises."
+        _noise("adc.noise=3 DN"),
+        "An ADC with a noise of 3 DN rms, which no gain in front of it raises.",
     ),
     "saturation": Example(
         (*_chart("step-wedge"), *GRAY, "exposure.time=40 ms", "adc.full_scale=6 V"),
-        "Pixels that are full take no more: the brightest steps become one.",
+        "Full pixels are clipped: the brightest steps become one.",
     ),
     "quantization": Example(
         (*_chart("step-wedge"), *GRAY, "adc.bits=3"),

@@ -1,4 +1,4 @@
-"""Noise of the ADC itself, behind all gains: the same codes whatever the exposure's gain.
+"""Noise of the ADC, behind all gains: the same in DN at any gain.
 
     variance = (n / K)^2   [electrons squared]
 
@@ -19,9 +19,9 @@ from vcam_cli.effects.signal_chain import NoiseSource, Quantizer, Site
 
 @dataclass(frozen=True)
 class AdcNoise(NoiseSource):
-    """Normal noise of every conversion [DN rms], new in each, referred to the pixel.
+    """Normal noise of every conversion [DN rms], referred to the pixel.
 
-    It acts behind the well: a full pixel reads now more, now less than it holds.
+    It acts behind the well, so full pixels show it.
     """
 
     codes: float

@@ -1,4 +1,4 @@
-"""Noise of whole rows that neighboring rows share in part: horizontal bands.
+"""Row noise correlated between neighboring rows: horizontal bands.
 
     x_k = r x_(k-1) + sqrt(1 - r^2) z_k
 

@@ -1,4 +1,4 @@
-"""Fixed-pattern noise: no two pixels, and no two columns, are alike; and some do not work.
+"""Fixed-pattern noise: offsets and gains of pixels and columns, and defects.
 
     electrons = signal (1 + g_pixel z_1 + g_column z_2) + o_pixel z_3 + o_column z_4
 
@@ -31,15 +31,13 @@ OVERFULL = 100
 class FixedPattern(NoiseSource):
     """Offsets [electrons] and gains [1], per pixel and per column, drawn from the sensor seed.
 
-    With them dark currents: a pixel's is the mean one times 1 + `dark` z, and never below zero; it
-    makes shot noise of its own. And pixels that do not work: a hot one leaks so much that it reads
-    the full well whatever the light is (the clip comes last, and takes the readout noise with it),
-    or has a dark current above the mean one by a factor, distributed exponentially, whose noise is
-    drawn, but not in the stated temporal variance; a dead one, and those of a bad column or row,
-    collects nothing, and reads offset and readout noise. Which pixels these are does
-    not depend on the float type, and a larger fraction has the pixels of a smaller one.
-
-    A ccd's defects and dark currents stay in their pixels: charge transfer moves mean signals.
+    Dark currents vary as well: that of a pixel is the mean times 1 + `dark` z, at least zero, with
+    its own shot noise. Defects: a hot pixel reads the full well in any light, without readout
+    noise, or has an exponentially distributed factor on its dark current, whose noise is drawn but
+    not included in the stated temporal variance. A dead pixel, and those of a dead column or row,
+    collects no charge and reads offset and readout noise. The selection of pixels does not depend
+    on the float type; a larger fraction includes the pixels of a smaller one. Charge transfer of a
+    CCD does not move defects and dark currents.
     """
 
     offset_pixel: float

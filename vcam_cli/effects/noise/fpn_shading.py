@@ -1,4 +1,4 @@
-"""The slow part of the fixed pattern: offsets and gains that drift over the array.
+"""Low-frequency fixed pattern: offsets and gains that vary slowly over the array.
 
     offset(x, y) = sum_jk a_jk cos(pi j x / W) cos(pi k y / H),   likewise gain(x, y) - 1
 

@@ -1,4 +1,4 @@
-"""Noise of the readout whose large values are more frequent than those of normal noise.
+"""Heavy-tailed noise of the readout: large values are more frequent than in normal noise.
 
     noise = rms Q(u) / std(Q),   Q(u) = (u^s - (1 - u)^s) / s
 

@@ -22,7 +22,7 @@ from vcam_cli.effects.signal_chain import NoiseSource, Site
 class ReadNoise(NoiseSource):
     """Input-referred noise of one readout [electrons rms], new in every frame.
 
-    A pixel has its own, that of its column and that of its row; the three are independent.
+    Noise of the pixel, its column and its row add; the three are independent.
     """
 
     electrons: float

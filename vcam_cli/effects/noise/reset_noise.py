@@ -1,4 +1,4 @@
-"""Charge that the reset leaves uncertain.
+"""Reset noise (kTC): the random charge that a reset leaves.
 
     variance = k T C / q^2   [electrons squared]
 
@@ -21,10 +21,10 @@ from vcam_cli.physics import readout
 
 @dataclass(frozen=True)
 class ResetNoise(NoiseSource):
-    """Thermal noise of what is reset, or a stated number [electrons rms].
+    """Thermal noise of the reset node, or a stated number [electrons rms].
 
-    What is reset is the architecture's: the photodiode, or the bit line of a passive pixel. Where
-    correlated double sampling removes the noise, a stated one is not simulated.
+    The architecture determines the node: the photodiode, or the bit line of a passive pixel. With
+    correlated double sampling a stated noise is not simulated.
     """
 
     electrons: float

@@ -1,4 +1,4 @@
-"""Light and dark current arrive one by one.
+"""Shot noise of light and dark current: independent arrivals of electrons.
 
     P(n) = e^(-mu) mu^n / n!,   variance = mean = mu
 

@@ -25,10 +25,10 @@ from vcam_cli.effects.signal_chain import NoiseSource, Site
 class TelegraphNoise(NoiseSource):
     """Pixels with a trap, which shifts their signal by a step while it is filled.
 
-    Which pixels have one, and how large its step A is, stays with the sensor; whether it is filled
-    is new in every readout, since traps change faster than frames follow each other. Where
-    correlated double sampling takes the difference of two readouts a pixel has three levels, -A, 0
-    and A; elsewhere it has two. Their mean is taken as part of the pixel's offset.
+    Positions and steps A are fixed to the sensor; the state of a trap is drawn anew in every
+    readout, since traps switch faster than frames follow. With correlated double sampling, the
+    difference of two readouts, a pixel has three levels: -A, 0 and A; otherwise two. Their mean is
+    part of the pixel's offset.
     """
 
     fraction: float

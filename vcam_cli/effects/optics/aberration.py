@@ -1,12 +1,12 @@
-"""Blur by the lens's aberrations: defocus, Zernike wavefronts, or what was measured.
+"""Blur by the lens's aberrations: defocus, Zernike wavefronts, or a measured blur.
 
     H(f) = mean of exp(2 pi i (W(p + s / 2) - W(p - s / 2)) / lambda)
 
 over the points p that two pupils share which lie s = lambda N (1 - m) f diameters apart, W the
-wavefront. A measured PSF has its Fourier transform for H, a measured MTF its own value.
+wavefront. For a measured PSF, H is its Fourier transform; a measured MTF is H itself.
 
-`Diffraction` says what diffraction leaves of contrast; an aberration is the factor that makes it
-less. Which kind of blur a camera has depends on its file:
+`Diffraction` is the transfer function of a perfect lens; an aberration is a further factor. The
+camera file determines the class:
 
     point_spread.py     a point spread function, measured or from a lens program
     traced_blur.py      wavefronts of a lens that is given by its prescription
@@ -44,7 +44,7 @@ KINDS = (
 
 
 class Aberration(AberrationBlur):
-    """What makes the lens worse than a perfect one."""
+    """Aberrations: the OTF of the lens divided by that of a perfect lens."""
 
     @classmethod
     def from_camera(cls, camera: Camera, geometry: Geometry) -> AberrationBlur | None:

@@ -1,12 +1,11 @@
-"""Layers at their own distances: each is out of focus by itself, and hides what is behind it.
+"""Layers at different distances: each has its own defocus and occludes those behind it.
 
     E = sum_i T_i[E_i a_i] prod_{j < i} (1 - T_j[a_j]) - covariances over the aperture
 
 E_i and a_i are the light and the opacity of layer i, the nearest first; T_i is the blur of its
 distance d before a lens that is focused at s: a shift of the image plane by v^2 (1/d - 1/s).
 
-The work is done by `image_formation.layered`; without it a scene is a pinhole's picture of all
-layers, seen by a lens that is focused on it.
+`image_formation.layers` computes it. If skipped, all layers are in focus.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from vcam_cli.physics.depth_of_field import blur_diameter
 
 @dataclass(frozen=True)
 class Depth(Effect):
-    """Layers and how far the lens throws a point of each by defocus alone."""
+    """Layers with the radius of the defocus blur of each."""
 
     blurs: tuple[float, ...]
     """Diameters on the sensor, the nearest layer's first [m]; () where a map has the distances."""

@@ -2,8 +2,8 @@
 
     OTF(f) = (2 / pi) (acos(nu) - nu sqrt(1 - nu^2)),   nu = |f| lambda N (1 - m) < 1, else 0
 
-N is the f-number, m the magnification, f the frequency on the sensor. Contrast is gone from the
-frequency 1 / (lambda N (1 - m)) on, earlier in red light than in blue.
+N is the f-number, m the magnification, f the frequency on the sensor. The cut-off frequency is 1 /
+(lambda N (1 - m)), lower for red light than for blue.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
-"""Distortion: the lens images directions elsewhere than a pinhole would.
+"""Distortion: the lens images directions to other places than a pinhole.
 
     x' = D(X / Z, Y / Z)     in units of the image distance
 
 D is the lens's projection and OpenCV's model, or a table. The pixel at x' sees the light that comes
-from there, through the blur at x': blur is that of the image plane. The image is not made brighter
-where it is compressed: `optics.off_axis` says the relative illumination of each place of the
-sensor, and the change of area is in it.
+from there, through the blur at x': blur is that of the image plane. Compression does not make the
+image brighter: `optics.off_axis` gives the relative illumination of each place on the sensor, with
+the change of area included.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ INSIDE = (0.25, 0.5, 0.75, 1.0)
 
 @dataclass(frozen=True)
 class Distortion(StillWarp):
-    """The mapping of a lens's image."""
+    """Geometric distortion: the mapping from directions to places on the sensor."""
 
     mapping: Mapping
     geometry: Geometry

@@ -2,8 +2,8 @@
 
     x' = (1 + m(wavelength)) x
 
-It is exact in the spectrum: the image is warped at some wavelengths and straight in between, as
-many as the tolerance needs (`image_formation.warps`).
+The image is warped at several wavelengths and interpolated linearly between them; the tolerance
+sets their number (`image_formation.warps`).
 """
 
 from __future__ import annotations

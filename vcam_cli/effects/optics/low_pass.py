@@ -4,8 +4,8 @@
 
 d is the displacement of the two copies that a plate makes, r the mean distance of all copies from
 their center, |d| / 2 for one plate. One plate along x, y or a diagonal makes two copies, two
-crossed plates four, at the corners of a square. Contrast falls to 0 at half a cycle per |d|. The
-copies are as bright as each other, whatever the light's polarization and wavelength.
+crossed plates four, at the corners of a square. Contrast falls to 0 at half a cycle per |d|. All
+copies are equally bright, at any polarization and wavelength.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Vectors = tuple[tuple[float, float], ...]
 class LowPass(Effect):
     """Displaced copies of the image, by a birefringent filter on the sensor.
 
-    `from_camera` returns the kind of it that a camera has.
+    `from_camera` selects the computation.
     """
 
     name = "low_pass"

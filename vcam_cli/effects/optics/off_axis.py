@@ -3,8 +3,8 @@
     E(phi) / E(0) = (1 + a) / (2 a) (1 - A / sqrt(A^2 + 4 a)),   A = 1 - a + b
 
 with a the squared tangent of half the image-side cone, 1 / (4 N^2 (1 - m)^2), and b that of the
-angle phi off the axis. For a small aperture it is cos^4(phi), which `cos4` always takes. Measured
-tables of all light, or of each filter color, take its place.
+angle phi off the axis. For a small aperture it is cos^4(phi); `cos4` uses this form at any
+aperture. Measured tables of all light, or of each filter color, take its place.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Light that lens and housing scatter over the whole sensor.
+"""Veiling glare: lens and housing scatter light over the whole sensor.
 
     E' = (1 - s) E + s mean(E)
 
-s is the share that is spread, the mean is that of a color over the array.
+s is the veiling glare index, the mean is that of a color over the array.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from vcam_cli.effects.pixel_signal import VeilingGlare
 class StrayLight(VeilingGlare):
     """Veiling glare: E becomes (1 - s) E + s mean(E), the mean of a color over the array.
 
-    What lies beside the picture throws no light into it, and takes none.
+    Light from outside the picture is not simulated.
     """
 
     fraction: float

@@ -1,10 +1,10 @@
-"""Charge beyond the full well that spills along the column.
+"""Blooming: charge beyond the full well spills along the column.
 
     each way along the column = blooming (charge - full well) / 2
 
-Of the excess of a full pixel the share `blooming` goes on, half up and half down, and fills the
-neighbors one after the other until it has found room; a drain takes the rest. No charge is lost or
-made but what the drain takes and what leaves at the ends of a column.
+The share `blooming` of the excess of a full pixel flows half up and half down and fills the
+neighbors one after the other; a drain discards the rest. Charge is conserved except for the drain
+and the ends of a column.
 """
 
 from __future__ import annotations
@@ -25,10 +25,9 @@ from vcam_cli.errors import bad
 
 @dataclass(frozen=True)
 class Blooming(Overflow):
-    """Excess charge goes along columns, as their channel stops let it.
+    """Excess charge spills along columns, never along rows.
 
-    It spills once the exposure ends, noise and all, not while it goes on; none goes along rows. It
-    is not simulated of hot pixels whose charge is not stated.
+    It spills in one step at the end of the exposure, noise included. It is not simulated for hot pixels without a stated charge.
     """
 
     share: float

@@ -1,4 +1,4 @@
-"""Blur by charge that wanders sideways in the silicon before it is collected.
+"""Blur by charge that diffuses laterally in the silicon before it is collected.
 
     MTF(f) = D(f) / D(0),   1 / L_f^2 = 1 / L_n^2 + (2 pi f)^2
     D(f) = 1 - e^(-a L) + e^(-a L) integral_0^L_d a e^(-a z) sinh((L_d - z) / L_f) dz
@@ -7,12 +7,11 @@
 a is the absorption of silicon, L_n the diffusion length, L and L_d the depths of the depletion
 region and of the neutral one below it.
 
-Long waves go deep, below the field of the junction, so red light blurs more than blue. The transfer
-never falls to zero: what the depletion region absorbs is collected where it is born.
+Red light is absorbed below the depletion region, so it blurs more than blue. The transfer never
+falls to zero: charge from the depletion region is collected where it is generated.
 
-Why a factor beside the photodetector's aperture: so the thesis composes the sensor's transfer
-function, with charge collected wherever it meets a depletion region that covers the whole array.
-Where photodetectors are small and diffusion is long the two do not quite separate, and the true
+The thesis multiplies it by the aperture's MTF, with a depletion region that covers the whole array.
+For small photodetectors and long diffusion the two factors do not separate exactly, and the true
 contrast is higher: E. G. Stevens, IEEE Transactions on Electron Devices 39, 2621-2623, 1992,
 doi:10.1109/16.163473.
 """

@@ -1,4 +1,4 @@
-"""Charge that a ccd leaves behind on the way to its amplifier.
+"""Charge-transfer inefficiency of a CCD: charge left behind on the way to the amplifier.
 
     w_k = C(n + k - 1, k) e^k (1 - e)^n
 
@@ -29,20 +29,19 @@ ROWS = 64
 class ChargeTransfer(Transport):
     """Every stage leaves the share `inefficiency` of a packet to the packet that follows.
 
-    The amplifier is at row 0, column 0: a packet of row i, column j makes (i + 1) x phases
-    parallel transfers and then (j + 1) x phases serial ones. An electron arrives once it has made
-    all n of them, and every one that fails costs it a packet: it arrives k packets late (in a
-    larger row, or column) with the probability of k failures before n successes,
-        w_k = C(n + k - 1, k) inefficiency^k (1 - inefficiency)^n.
-    A wave of spatial frequency f keeps exp(-n inefficiency (1 - cos(2 pi f pitch))) of its
-    modulation. What is late beyond the last row or column has left the picture.
+    The amplifier is at row 0, column 0: a packet of row i, column j makes (i + 1) x phases parallel
+    transfers and then (j + 1) x phases serial ones. Each failed transfer delays an electron by one
+    packet: it arrives k packets late (in a larger row, or column) with the probability of k
+    failures before n successes, w_k = C(n + k - 1, k) inefficiency^k (1 - inefficiency)^n. A wave
+    of spatial frequency f keeps exp(-n inefficiency (1 - cos(2 pi f pitch))) of its modulation.
+    Charge delayed beyond the last row or column is lost.
 
-    Why it acts on mean signals: where every electron takes its own chance, a Poisson number of
-    electrons splits into independent Poisson numbers by when they arrive (displacement theorem,
-    Kingman, Poisson Processes, 1993, section 5.5). So every pixel is Poisson again, independent
-    of its neighbors, and its mean is all that has changed. Transfer is linear up to the full well,
-    which is all that a packet holds: light beyond it leaves no trail. A full pixel is read with its
-    well without what it defers; the noise of that, of a few electrons, is not simulated.
+    It acts on mean signals: electrons fail independently, so a Poisson number of electrons splits
+    into independent Poisson numbers by arrival (displacement theorem, Kingman, Poisson Processes,
+    1993, section 5.5). Every pixel stays Poisson and independent of its neighbors; only its mean
+    changes. Transfer is linear up to the full well; excess light leaves no trail. A full pixel is
+    read with its full well less the deferred charge, whose noise of a few electrons is not
+    simulated.
     """
 
     inefficiency: float

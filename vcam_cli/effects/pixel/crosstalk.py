@@ -1,4 +1,4 @@
-"""What a pixel gives to its neighbors: light, charge, and the voltage of its sense node.
+"""Crosstalk between neighbors: optical, electrical, and by interpixel capacitance.
 
     s'(r) = sum_d K(d) s(r - d),   sum_d K(d) = 1
 
@@ -6,9 +6,9 @@ With the share c to each of the four nearest, MTF(u, v) = 1 - 4 c + 2 c (cos 2 p
 u and v in cycles per pixel. In a mosaic neighbors are of other colors, so that colors mix: behind
 a Bayer mosaic red is (1 - 4 c) R + 4 c G, green (1 - 4 c) G + 2 c (R + B).
 
-Light and charge that stray before they are counted arrive by chance, so noise of neighbors is
-independent. Interpixel capacitance acts behind: neighbors show part of each other's noise, with the
-covariance C_01 / C_00 = 2 c (1 - 4 c) / ((1 - 4 c)^2 + 4 c^2), about 2 c.
+Optical and electrical crosstalk act on Poisson charges, so the noise of neighbors stays
+independent. Interpixel capacitance couples voltages, so it correlates the noise of neighbors, with
+the covariance C_01 / C_00 = 2 c (1 - 4 c) / ((1 - 4 c)^2 + 4 c^2), about 2 c.
 """
 
 from __future__ import annotations
@@ -31,12 +31,11 @@ MIDDLE = 550e-9
 
 @dataclass(frozen=True)
 class Crosstalk(NeighborSharing):
-    """Optical crosstalk, then electrical, then charge is counted, then interpixel capacitance.
+    """Optical and electrical crosstalk before charge is counted, interpixel capacitance behind.
 
-    A kernel by wavelength is, for each color, its mean over the electrons that the scene's white
-    makes behind that color's filter. Beyond the array's border lie pixels of its pattern that see
-    what those inside see. Pattern of dark currents and reset noise do not couple; charge beyond the
-    full well does not either.
+    A kernel by wavelength is averaged for each color, weighted by the electrons of the scene's
+    white behind that color's filter. At the border the array is extended by its own pattern and
+    light. Dark-current pattern, reset noise and charge beyond the full well do not couple.
     """
 
     before: tuple[Kernels, ...]

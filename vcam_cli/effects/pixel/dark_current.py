@@ -1,4 +1,4 @@
-"""Electrons that heat makes.
+"""Dark current: thermally generated electrons.
 
     electrons = rate T,   rate(temperature) = rate(T_0) 2^((temperature - T_0) / doubling)
 
@@ -21,7 +21,7 @@ from vcam_cli.effects.pixel_signal import Charge
 class DarkCurrent(Charge):
     """Mean dark current of a pixel [e/s]; its shot noise is part of `shot_noise`.
 
-    Where charges are joined before they are read, of all the pixels that make one.
+    With charge binning it is that of all binned pixels.
     """
 
     electrons_per_second: float

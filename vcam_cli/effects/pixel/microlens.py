@@ -1,13 +1,12 @@
-"""A lens on every pixel, which collects light for its photodetector.
+"""Microlens: a lens on every pixel collects light for its photodetector.
 
     gain = min(g w h, 0.95 W H) / (w h)
 
 g is the microlens's `gain`, w and h are the sides of the photodetector, W and H those of the pixel.
 `efficiency` states the share of the pixel that is collected instead.
 
-It does two things. It gathers the light of a larger area, which is this effect: a factor on the
-signal, the same in all pixels. And the signal is an average over that larger area, which is
-`pixel_aperture`'s: see `camera.pixel_optics`.
+This effect is the larger signal, a factor that is the same in all pixels. The larger sampling area
+is part of `pixel_aperture`.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Blur by the pixel, which averages over the area whose light it collects.
+"""Blur by the pixel aperture: each pixel averages over the area that collects its light.
 
     H(f) = sinc(f_x w) sinc(f_y h),   sinc(u) = sin(pi u) / (pi u)
 
-w and h are width and height of the area that collects the pixel's light: the photodetector, or
-that of its microlens. What a pixel's pitch samples too coarsely then comes back as aliasing.
+w and h are width and height of the area that collects the pixel's light: the photodetector, or that
+of its microlens. Frequencies above the Nyquist frequency of the pitch alias.
 """
 
 from __future__ import annotations

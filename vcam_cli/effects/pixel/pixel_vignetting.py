@@ -1,9 +1,9 @@
-"""Light that the tunnel above each photodetector keeps from it: more of it toward the corners.
+"""Pixel vignetting: the tunnel above each photodetector shades it, more toward the corners.
 
     share = mean over the exit pupil of overlap T,   overlap = (1 - |d_x| / w) (1 - |d_y| / h)
 
-d is how far a ray walks sideways in the layers, by Snell's law, w and h are the sides of tunnel and
-photodetector, and T is what the interfaces between the layers let through, by Fresnel's.
+d is the lateral displacement of a ray in the layers (Snell's law), w and h are the sides of tunnel
+and photodetector, and T is the transmission of the interfaces (Fresnel's equations).
 
 The loss depends on where the pixel lies only, by the angle of its chief ray; it is the same in
 all four quadrants of the field, for photodetectors off their pixel's center as well, since the

@@ -1,8 +1,8 @@
-"""A well holds a limited number of electrons.
+"""Saturation: the signal is clipped at the full well.
 
     electrons = min(signal + noise, full well)
 
-Noise has been added by then, so that pixels that are full show none.
+Noise of the pixel is added before the clip, so full pixels show only noise behind it.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Flicker of the lamp: every line sees the light of its own time.
+"""Flicker of the lamp: every line integrates the light at its own time.
 
     E / mean = 1 + depth sinc(F T) cos(2 pi F (t + T / 2) + phase)
 
 F is the lamp's frequency, t the start of the line's exposure and T its length: an exposure of a
-whole number of periods sees steady light. A lamp with `duty` is on for that part of each period.
+whole number of periods has no modulation. A lamp with `duty` is on for that part of each period.
 """
 
 from __future__ import annotations
@@ -23,10 +23,7 @@ from vcam_cli.physics import flicker
 
 @dataclass(frozen=True)
 class Flicker(TemporalGain):
-    """Light about its mean over an exposure: banding under a rolling shutter.
-
-    A global shutter has it the same in all pixels.
-    """
+    """Modulation of the light: bands under a rolling shutter, one factor under a global one."""
 
     lamp: FlickerSpec
     lines: LineTimes

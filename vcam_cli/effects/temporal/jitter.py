@@ -1,4 +1,4 @@
-"""Jitter of the camera's pointing, fast against the exposure: a Gaussian blur.
+"""Pointing jitter of the camera, fast relative to the exposure: a Gaussian blur.
 
     H(f) = exp(-2 pi^2 sigma^2 f^2)
 
@@ -23,7 +23,7 @@ REACH = 4.0
 
 @dataclass(frozen=True)
 class Jitter(RadialTransfer):
-    """Pointing that is distributed normally, alike along both axes, in any part of an exposure.
+    """Normally distributed pointing error, equal along both axes, fast relative to the exposure.
 
     It is the same in every frame and sample: slow drift from frame to frame is not simulated, nor
     how a rolling shutter turns jitter into wobble.

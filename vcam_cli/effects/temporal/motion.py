@@ -2,11 +2,11 @@
 
     H(f) = sinc(f_x v_x T + f_y v_y T),   sinc(u) = sin(pi u) / (pi u)
 
-v is the velocity of the image on the sensor, T the exposure time; of other paths H is the mean of
-exp(-2 pi i f x(t)) over them.
+v is the velocity of the image on the sensor, T the exposure time; for other paths H is the mean of
+exp(-2 pi i f x(t)) over the path.
 
-The scene is where its file says at the reference time: by default in the middle of the exposure of
-the array's middle, where that begins at 0 s. What an image does decides how it is computed:
+The scene has the position of the file at the reference time, by default the middle of the exposure
+of the array's central row, which begins at 0 s. The motion determines the computation:
 
 - it moves evenly, and rows are exposed together or in turn: a sinc, and displaced rows (here);
 - it moves along any path, and all pixels are exposed together: the path's own transfer (here);
@@ -31,9 +31,9 @@ from vcam_cli.physics.motion_blur import path_transfer
 
 
 class Motion(Effect):
-    """Motion of the scene or the camera while a frame is exposed: blur, skew and wobble.
+    """Motion of the scene or the camera during the exposure: blur, skew and wobble.
 
-    `from_camera` returns the kind of it that a camera has.
+    `from_camera` selects the computation.
     """
 
     name = "motion"
