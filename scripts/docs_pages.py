@@ -139,9 +139,14 @@ def _effect(effect: Any) -> Iterator[str]:
     text = module.partition("\n\n")[2].split("\nReferences\n")[0]
     if text.strip():
         yield _blocks(text) + "\n"
-    yield f"- source: {escaped(effect.reference)}"
-    yield f"- not where {escaped(effect.absent)}"
-    yield f"- switched off by `effects: {{{name}: off}}`\n"
+    absent = escaped(effect.absent)
+    yield f"**Source:** {escaped(effect.reference)}\n"
+    yield (
+        f"**Absent** where {absent}."
+        if not absent.startswith("every")
+        else f"**Always:** {absent}."
+    )
+    yield f"`effects: {{{name}: off}}` switches it off.\n"
 
 
 def _prose(text: str | None) -> str:

@@ -147,6 +147,15 @@ def _effects() -> dict[str, Any]:
     return {effect.name: effect for effect in ORDER}
 
 
+def _when(effect: Any) -> str:
+    """Return where an effect has no part, and whether the plan may skip it."""
+    always = effect.absent.startswith("every ")
+    present = f"always: {effect.absent}" if always else f"not where {effect.absent}"
+    if not effect.removable:
+        return f"{present}; the plan never skips it"
+    return f"{present}; `vcam plan CAMERA` shows its contribution to that scene"
+
+
 def _of_effect(word: str) -> Iterator[dict[str, Any]]:
     import inspect
 
@@ -173,12 +182,7 @@ def _of_effect(word: str) -> Iterator[dict[str, Any]]:
         "about": " ".join(inspect.cleandoc(effect.__doc__ or "").split()),
         "equation": equation(effect),
         "source": effect.reference,
-        "when it matters": f"not where {effect.absent}"
-        + (
-            "; else `vcam plan CAMERA` says how much it changes for that scene"
-            if effect.removable
-            else "; the plan never leaves it out"
-        ),
+        "when it matters": _when(effect),
         "cost": cost,
         "keys": ", ".join(keys) or "none of its own",
         "switch": f"effects: {{{effect.name}: off}}",

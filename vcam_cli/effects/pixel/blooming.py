@@ -27,7 +27,8 @@ from vcam_cli.errors import bad
 class Blooming(Overflow):
     """Excess charge spills along columns, never along rows.
 
-    It spills in one step at the end of the exposure, noise included. It is not simulated for hot pixels without a stated charge.
+    It spills in one step at the end of the exposure, noise included. It is not simulated for hot
+    pixels without a stated charge.
     """
 
     share: float
