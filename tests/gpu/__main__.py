@@ -34,10 +34,10 @@ scenes: {files: "*.png", frames_each: 4}
 vary:
   exposure.time: {log_uniform: [1 ms, 30 ms]}
   exposure.gain: {choice: [1, 2, 4, 8]}
-frames: 512
+frames: 4096
 size: {rows: 512, columns: 512}
 write: [raw, clean]
-shards: 4
+shards: 16
 """
 MEAN = 1e-5
 """Difference from the processor's mean signal that is allowed, over full signal."""
@@ -272,7 +272,7 @@ def commands() -> None:
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         write_png(place / "p.png", photograph(1000, 1400))
-        text = DATASET.replace("512", "64").replace("shards: 4", "shards: 2")
+        text = DATASET.replace("512", "64").replace("4096", "64").replace("shards: 16", "shards: 2")
         (place / "set.yaml").write_text(text)
         for words in (
             ("run", "starter", *small),
