@@ -1,12 +1,15 @@
 """Files of spectra from file to electrons, against sums by hand and against images."""
 
 import math
+import subprocess
+import sys
 
 import numpy as np
 import OpenImageIO as oiio
 import pytest
 from making import GONE, LIGHT, PLANCK, QUIET, camera
 from spectral_files import envi
+from sweeping import environment
 
 from vcam_cli import simulate
 from vcam_cli.errors import BadInput
@@ -166,3 +169,41 @@ def test_a_file_is_checked_before_anything_is_computed(tmp_path):
     (tmp_path / "cube.npz").write_bytes(b"PK")
     with pytest.raises(BadInput, match="no complete npz"):
         load(tmp_path / "made.yaml")
+
+
+PEAK = """
+import sys
+from pathlib import Path
+from vcam_cli import load
+from vcam_cli.simulation.shared import Shared
+from vcam_cli.simulation.simulate import simulate
+result = simulate(load(sys.argv[1]), 1, shared=Shared())
+status = Path("/proc/self/status").read_text()
+peak = 1024 * int(status.partition("VmHWM:")[2].split()[0])
+print(peak, result.frame.plan.memory_bytes, result.dn.sum())
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads the peak from /proc")
+def test_memory_is_estimated_and_envi_files_stay_on_the_disk(tmp_path):
+    """A file of 95 MB: read whole as npz, in strips as ENVI; the same frame."""
+    side = 875
+    cube = np.random.default_rng(1).uniform(0, 0.02, (side, side, 31)).astype(np.float32)
+    found = {}
+    for kind in ("npz", "hdr"):
+        if kind == "npz":
+            np.savez(tmp_path / "cube.npz", wavelength_nm=NM, radiance=cube)
+        else:
+            envi(tmp_path / "cube.hdr", nm=NM, cube=cube, data_units="W/(m2 nm sr)")
+        source = {"kind": "hyperspectral", "file": str(tmp_path / f"cube.{kind}")}
+        camera(tmp_path, PLAIN | {"scene.source": source, "accuracy": "standard"})
+        told = subprocess.run(
+            [sys.executable, "-c", PEAK, str(tmp_path / "made.yaml")],
+            capture_output=True, text=True, check=True, env=environment(),
+        )  # fmt: skip
+        found[kind] = [int(word) for word in told.stdout.split()]
+    for peak, estimate, _ in found.values():
+        assert peak <= estimate <= 1.6 * peak
+    assert found["npz"][2] == found["hdr"][2]
+    assert found["hdr"][0] < found["npz"][0] - 30e6
+    assert found["npz"][1] - found["hdr"][1] > 25e6

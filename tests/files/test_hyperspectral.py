@@ -4,6 +4,7 @@ import builtins
 import importlib
 import io
 import zipfile
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from vcam_cli.camera.scene.scene_files import Variables
 from vcam_cli.errors import BadInput, CannotDo
 from vcam_cli.files.spectral.exr import write_spectral
 from vcam_cli.files.spectral.hyperspectral import companions, read_bands, read_cube
+from vcam_cli.scenes.hyperspectral import StoredSamples
 
 PER_NM = 1e9
 """W/(sr m2 nm) in W/(sr m2 m)."""
@@ -26,8 +28,10 @@ def read(path):
     np.testing.assert_array_equal(bands.wavelengths, cube.bands.wavelengths)
     assert bands.quantity == cube.bands.quantity
     assert cube.data.dtype == np.float32
-    assert cube.data.flags.c_contiguous
-    return cube, notes
+    data = np.asarray(cube.data)
+    assert data.dtype == np.float32
+    assert data.shape == cube.data.shape
+    return replace(cube, data=data), notes
 
 
 def holds(path, unit=1.0, cube=CUBE, quantity=None, nm=NM):
@@ -136,6 +140,32 @@ class TestEnvi:
             reflectance_scale_factor=100, header_offset=3,
         )  # fmt: skip
         assert holds(path, cube=codes / 100) == ()
+
+    @pytest.mark.parametrize("interleave", ["bsq", "bil", "bip"])
+    def test_it_stays_in_the_file_and_reads_like_an_array(self, interleave, tmp_path):
+        """Rows, rectangles, rectangles of those, samples; negative values are 0."""
+        cube = np.random.default_rng(3).uniform(-0.001, 1, (150, 7, 4)).astype(np.float32)
+        said = {"interleave": interleave, "reflectance_scale_factor": 1, "nm": [400, 500, 600, 700]}
+        path = made.envi(tmp_path / "a.hdr", cube=cube, header_offset=5, **said)
+        stored, whole = read_cube(path, ())[0].data, np.maximum(cube, 0)
+        assert isinstance(stored, StoredSamples)
+        np.testing.assert_array_equal(stored, whole)
+        np.testing.assert_array_equal(stored[60:131], whole[60:131])
+        np.testing.assert_array_equal(stored[140:999], whole[140:])
+        part, own = stored[10:140, 2:6], whole[10:140, 2:6]
+        assert (part.shape, len(part)) == (own.shape, 130)
+        np.testing.assert_array_equal(part, own)
+        np.testing.assert_array_equal(part[3:99, 1:3][5:7], own[3:99, 1:3][5:7])
+        places = np.ix_([129, 0, 64, 63, 64], [3, 1, 1])
+        np.testing.assert_array_equal(part[places], own[places])
+
+    def test_a_file_that_becomes_shorter_meanwhile(self, tmp_path):
+        path = made.envi(tmp_path / "a.hdr", reflectance_scale_factor=1)
+        stored = read_cube(path, ())[0].data
+        raw = path.with_suffix(".raw")
+        raw.write_bytes(raw.read_bytes()[:-4])
+        with pytest.raises(CannotDo, match="shorter while it was read"):
+            stored[:]
 
     @pytest.mark.parametrize(
         ("unit", "value"),

@@ -37,7 +37,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, ClassVar, Literal, TypeVar
+from typing import ClassVar, Literal, TypeVar, cast
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
@@ -62,8 +62,7 @@ def of_kind(effects: Iterable[Effect], *kinds: type[Kind]) -> tuple[Kind, ...]:
     tuple of Kind
         The effects that are instances of a kind.
     """
-    found: Iterable[Any] = (effect for effect in effects if _is_of(type(effect), kinds))
-    return tuple(found)
+    return tuple(cast(Kind, effect) for effect in effects if _is_of(type(effect), kinds))
 
 
 @cache

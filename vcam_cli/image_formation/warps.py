@@ -443,7 +443,7 @@ def _chart(scene: Scene) -> Chart:
             frame = Frame(width * scene.pitch_x, height * scene.pitch_y)
             mirrored = scene.black == (0, 0)
             if isinstance(scene, CubeScene):
-                return CubeChart(scene.picture, frame, mirrored, scene.units)
+                return CubeChart(np.asarray(scene.picture), frame, mirrored, scene.units)
             return PictureChart(scene.picture, frame, mirrored)
     raise ValueError(f"no warp of a {type(scene).__name__}")
 

@@ -18,10 +18,13 @@ the components by the fewest mixtures that keep every transfer function within t
 the cube once: 0.02 s for 31 bands of a megapixel.
 """
 
+from __future__ import annotations
+
 import math
-from dataclasses import dataclass, fields
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 
@@ -30,7 +33,7 @@ from vcam_cli.camera.scene.illuminant import IlluminantSpec
 from vcam_cli.camera.scene.scene import Scene
 from vcam_cli.errors import bad
 from vcam_cli.scenes import light
-from vcam_cli.scenes.bands import paint_by_bands
+from vcam_cli.scenes.bands import bands_of_rows, paint_by_bands
 from vcam_cli.scenes.base import View
 from vcam_cli.scenes.image import ImageScene, image_scene
 from vcam_cli.spectra import Spectrum, Table, integral, luminance
@@ -68,13 +71,78 @@ class Bands:
 
 
 @dataclass(frozen=True)
+class StoredSamples:
+    """Values (h, w, bands) that stay in their file: rows are read whenever they are used.
+
+    It reads like an array in the ways that scenes need: some rows, a rectangle, single samples.
+    """
+
+    read: Callable[[int, int], Array]
+    """Returns the rows (n, w, bands) from one to another, float32."""
+    shape: tuple[int, int, int]
+    top: int = 0
+    """First of the rows."""
+    left: int = 0
+    """First of the columns."""
+    dtype = np.dtype(np.float32)
+    ndim = 3
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the largest strip that is read at once [bytes]."""
+        rows, columns, bands = self.shape
+        strip = bands_of_rows(rows, columns)[0].stop
+        return int(strip * columns * bands * self.dtype.itemsize)
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, key: Any) -> Any:
+        if isinstance(key, slice):
+            start, stop, _ = key.indices(self.shape[0])
+            rows = self.read(self.top + start, self.top + max(start, stop))
+            return rows[:, self.left : self.left + self.shape[1]]
+        rows, columns = key
+        if isinstance(rows, slice):
+            return self._part(rows, columns)
+        return self._samples(rows.ravel(), columns.ravel())
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
+        return np.asarray(self[:], dtype)
+
+    def _part(self, rows: slice, columns: slice) -> StoredSamples:
+        """Return a rectangle of it."""
+        top, bottom, _ = rows.indices(self.shape[0])
+        left, right, _ = columns.indices(self.shape[1])
+        shape = bottom - top, right - left, self.shape[2]
+        return replace(self, shape=shape, top=self.top + top, left=self.left + left)
+
+    def _samples(self, rows: Array, columns: Array) -> Array:
+        """Return the samples in some rows and columns."""
+        out = np.empty((len(rows), len(columns), self.shape[2]), self.dtype)
+        for top in range(0, self.shape[0], ROWS):
+            here = np.flatnonzero((rows >= top) & (rows < top + ROWS))
+            if len(here):
+                block = self[top : top + ROWS]
+                out[here] = block[np.ix_(rows[here] - top, columns)]
+        return out
+
+
+@dataclass(frozen=True)
 class Cube:
     """A file of spectra."""
 
-    data: Array
+    data: Array | StoredSamples
     """Radiance [W/(sr m2 m)] or reflectance (h, w, bands), float32."""
     bands: Bands
     """What the bands are."""
+    reading: int = 0
+    """Memory that was taken beside the samples while they were read [bytes]."""
+
+    @property
+    def nbytes(self) -> int:
+        """Memory that it takes [bytes]: of samples that stay in their file, that of a strip."""
+        return self.data.nbytes
 
 
 @dataclass(frozen=True)
@@ -105,8 +173,17 @@ class CubeScene(ImageScene):
     @cached_property
     def brightest(self) -> float:
         """Largest sample of a band over that of white there."""
-        most = self.picture.reshape(-1, self.picture.shape[2]).max(axis=0) / self.units
+        blocks = (self.picture[top : top + ROWS] for top in range(0, len(self.picture), ROWS))
+        most = np.max([block.max(axis=(0, 1)) for block in blocks], axis=0) / self.units
         return max(float(most.max()), 0.0)
+
+    def _mean_of_rows(self, weights: Array) -> Array:
+        """Return the weighted sum over the rows, (columns, bands), strip by strip."""
+        total = np.zeros(self.picture.shape[1:], weights.dtype)
+        for top in range(0, len(self.picture), ROWS):
+            block = self.picture[top : top + ROWS]
+            total += np.tensordot(weights[top : top + ROWS], block, axes=1)
+        return total
 
     def _channel_weights(self, mix: Array) -> Array:
         """Return what the bands count in combinations of the components (R, K)."""
@@ -260,7 +337,8 @@ def cube_scene(scene: Scene, cube: Cube, view: View) -> CubeScene:
         spectra = tuple(
             hat.scale_by(unit * white.scale) for hat, unit in zip(hats, units, strict=True)
         )
-    placed = image_scene(cube.data, spectra, white, view)
+    samples = cast(Array, cube.data)  # of one in a file, `CubeScene` takes no more than it gives
+    placed = image_scene(samples, spectra, white, view)
     return CubeScene(**{f.name: getattr(placed, f.name) for f in fields(placed)}, units=units)
 
 
@@ -304,7 +382,7 @@ def file_white(scene: Scene, cube: Cube) -> Array:
     )
 
 
-def _sample_levels(data: Array, weights: Array) -> tuple[Array, Array]:
+def _sample_levels(data: Array | StoredSamples, weights: Array) -> tuple[Array, Array]:
     """Return the weighted sum over the bands of every sample, and the mean of all samples."""
     levels = np.empty(data.shape[:2], np.float32)
     total = np.zeros(data.shape[2])

@@ -198,8 +198,12 @@ class ImageScene(SampledScene):
             weights.append(samples_in_boxes(place, half, self.shape[axis], self.black[axis]))
         kind = self.picture.dtype if self.picture.dtype.kind == "f" else np.dtype(float)
         across, down = (w.astype(kind) for w in weights)
-        line = down @ self.picture.reshape(len(down), -1)
-        return np.asarray(across @ line.reshape(len(across), -1) @ level)
+        return np.asarray(across @ self._mean_of_rows(down) @ level)
+
+    def _mean_of_rows(self, weights: Array) -> Array:
+        """Return the weighted sum over the rows, (columns, channels)."""
+        line = weights @ self.picture.reshape(len(weights), -1)
+        return np.asarray(line.reshape(-1, self.picture.shape[2]))
 
     def _step_factors(self, loss: BlurLoss, geometry: Geometry) -> Array:
         """Return the rms change over the array by steps of squared sum 1: (channels, C)."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -76,6 +77,8 @@ def read_scene(camera: Camera, stages: Stages) -> tuple[Any, tuple[str, ...]]:
         with stages("read"):
             cube, notes = read_cube(source.file, path, source.names)
             check_place(cube.bands, camera.optics.is_lens)
+            if camera.scene.has_depth:  # layers cut it in many ways
+                cube = replace(cube, data=np.asarray(cube.data))
             return _with_depth(camera, cube, notes)
     if isinstance(source, Layers):
         with stages("read"):
@@ -260,6 +263,23 @@ def scene_bytes(picture: ScenePicture) -> int:
     if isinstance(picture, tuple):
         return sum(files.nbytes for files in picture)
     return getattr(picture, "nbytes", 0)
+
+
+def reading_bytes(picture: ScenePicture) -> int:
+    """Return the memory that was taken beside a scene's files while they were read.
+
+    Parameters
+    ----------
+    picture : ScenePicture
+        Contents of the scene's files.
+
+    Returns
+    -------
+    int
+        Memory [bytes].
+    """
+    of_depth = picture.picture if isinstance(picture, DepthPicture) else picture
+    return of_depth.reading if isinstance(of_depth, Cube) else 0
 
 
 def build_scene(

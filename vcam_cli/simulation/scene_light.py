@@ -30,7 +30,13 @@ from vcam_cli.scenes.sampled_chart import sampled_chart
 from vcam_cli.scenes.waves import WaveScene
 from vcam_cli.simulation import cost_model
 from vcam_cli.simulation.run import Run
-from vcam_cli.simulation.scene_files import ScenePicture, build_scene, layer_optics, scene_bytes
+from vcam_cli.simulation.scene_files import (
+    ScenePicture,
+    build_scene,
+    layer_optics,
+    reading_bytes,
+    scene_bytes,
+)
 from vcam_cli.solve.solved import Solved
 
 ASSUMED = 0.9
@@ -62,7 +68,7 @@ class SceneLight:
     path: OpticalPath
     """Lens, pixels and settings through which the scene is seen."""
     memory: int
-    """Memory of a frame without its scene [bytes]."""
+    """Memory of a frame, or of reading its scene, without the scene [bytes]."""
     picture_memory: int
     """Memory of what was read of the scene [bytes]."""
     light_key: str
@@ -111,7 +117,9 @@ def scene_light(solved: Solved, picture: ScenePicture, run: Run) -> SceneLight:
         )
         read = scene_bytes(picture)
         key = solved.light_key
-        seen = SceneLight(solved, scene, transfer, white_rate, path, frame_bytes, read, key)
+        while_read = memory_model.BASE + reading_bytes(picture)
+        most = max(frame_bytes, while_read)
+        seen = SceneLight(solved, scene, transfer, white_rate, path, most, read, key)
         return exposed_as(seen, solved, picture)
 
 

@@ -43,7 +43,7 @@ class SpectralData:
     """The wavelengths (bands,) [m], in the order of the file."""
     quantity: Quantity
     read: Callable[[], Any]
-    """Returns the values (h, w, bands) as stored, perhaps as a map of the file."""
+    """Returns the values (h, w, bands) as stored."""
     gain: float | np.ndarray = 1.0
     """The gain of all bands, or one for each."""
     offset: float | np.ndarray = 0.0
@@ -55,6 +55,11 @@ class SpectralData:
     white: np.ndarray | None = None
     """The radiance (bands,) of a perfect white [W/(sr m2 m)], where the file holds it."""
     notes: tuple[str, ...] = ()
+    copies: int = 0
+    """How many times `read` holds the values in memory beside those that it returns."""
+    read_rows: Callable[[int, int], np.ndarray] | None = None
+    """Returns the values (n, w, bands) of the rows from one to another, where they can be read by
+    themselves: then the file is never in memory."""
 
 
 def finite_numbers(values: Any, what: str) -> np.ndarray:

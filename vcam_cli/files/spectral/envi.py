@@ -12,12 +12,14 @@ ENVI has no key that says what the values are, so it is read off the keys that s
 A header with none of these is refused, since nothing tells radiance from counts.
 """
 
+import math
 import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from vcam_cli.errors import CannotDo
 from vcam_cli.files.file_checks import UnusableFile, truncated_file
 from vcam_cli.files.spectral.data import PER_NM, SpectralData, check_length, finite_numbers
 
@@ -62,17 +64,38 @@ def open_envi(path: Path) -> SpectralData:
     sizes = {"bsq": (bands, height, width), "bil": (height, bands, width)}
     shape = sizes.get(interleave, (height, width, bands))
 
-    def read() -> Any:
-        mapped = np.memmap(raw, kind.newbyteorder(order), "r", offset, shape)
-        return mapped.transpose(INTERLEAVES[interleave])
+    def read_rows(start: int, stop: int) -> np.ndarray:
+        return _rows(raw, offset, kind.newbyteorder(order), shape, interleave, (start, stop))
 
     used = _bands_in_use(keys, bands)
     if used is not None:
         notes = (*notes, f"{bands - used.sum()} of {bands} bands are marked as bad (bbl), not used")
     return SpectralData(
-        (height, width), wavelengths, **_scale(keys, bands), read=read, notes=notes,
-        no_data=_no_data(keys, kind), used=used,
+        (height, width), wavelengths, **_scale(keys, bands), read=lambda: read_rows(0, height),
+        notes=notes, no_data=_no_data(keys, kind), used=used, read_rows=read_rows,
     )  # fmt: skip
+
+
+def _rows(
+    raw: Path,
+    offset: int,
+    kind: np.dtype,
+    shape: tuple[int, int, int],
+    interleave: str,
+    rows: tuple[int, int],
+) -> np.ndarray:
+    """Return some rows (n, w, bands) of a raw file whose axes have this shape in their order."""
+    along = INTERLEAVES[interleave][0]
+    pieces = shape[:along]  # of a file band by band, each band's rows are a piece
+    count = rows[1] - rows[0]
+    out = np.empty((*pieces, count, *shape[along + 1 :]), kind)
+    row_bytes = kind.itemsize * math.prod(shape[along + 1 :])
+    with open(raw, "rb") as file:
+        for number, piece in enumerate(out.reshape(math.prod(pieces), -1)):
+            file.seek(offset + (number * shape[along] + rows[0]) * row_bytes)
+            if file.readinto(piece.data.cast("B")) != piece.nbytes:
+                raise CannotDo(f"{raw} has become shorter while it was read", "run it again")
+    return out.transpose(INTERLEAVES[interleave])
 
 
 def data_file(path: Path) -> Path:

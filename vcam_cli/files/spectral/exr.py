@@ -126,6 +126,7 @@ def open_spectral(path: Path, wavelengths: Mapping[str, float] | None = None) ->
         gain=GAINS[quantity],
         white=white,
         notes=tuple(notes),
+        copies=1,
     )
 
 

@@ -4,8 +4,12 @@ Each format has a reader of its own; here are the checks and the change of units
 come radiances in W/(sr m2 m), or reflectances, as float32, bands by rising wavelength.
 """
 
+from __future__ import annotations
+
+import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +19,7 @@ from vcam_cli.camera.scene.scene_files import Variables
 from vcam_cli.errors import CannotDo
 from vcam_cli.files.file_checks import UnusableFile, check_file, convert_errors
 from vcam_cli.files.spectral.data import MOST_LIGHT, SpectralData
-from vcam_cli.scenes.hyperspectral import Bands, Cube
+from vcam_cli.scenes.hyperspectral import Bands, Cube, StoredSamples
 
 MOST_SAMPLES = 10**11
 """Samples of all bands that are read."""
@@ -107,7 +111,9 @@ def read_cube(
     """
     with _open_bands(Path(path), yaml_path, names) as (stored, order):
         data, notes = _si_samples(stored, order)
-        return Cube(data, _bands(stored, order)), (*stored.notes, *notes)
+        copies = stored.copies if stored.read_rows is None else 0
+        found = Cube(data, _bands(stored, order), copies * data.nbytes)
+        return found, (*stored.notes, *notes)
 
 
 def companions(path: Path | str) -> tuple[Path, ...]:
@@ -185,35 +191,49 @@ def _check_size(path: Path, stored: SpectralData) -> None:
     if not 0 < samples <= MOST_SAMPLES:
         raise UnusableFile(f"claims {height} x {width} samples in {len(stored.wavelengths)} bands")
     need, free = 2 * 4 * samples, memory.available()
-    if need > free:
+    if stored.read_rows is None and need > free:
         raise CannotDo(
             f"{path}: {width} x {height} samples in {len(stored.wavelengths)} bands need "
             f"{need / 1e9:.1f} GB of memory, {free / 1e9:.1f} GB are free",
-            "crop the file, or use a machine with more memory",
+            "crop the file, save it as ENVI, which is read in strips, or use a machine with more"
+            " memory",
         )
 
 
-def _si_samples(stored: SpectralData, order: Order) -> tuple[np.ndarray, list[str]]:
-    """Return the samples in SI units, float32, checked block by block, and notes."""
-    data = stored.read()
-    shape = (*stored.shape, len(stored.wavelengths))
-    if data.shape != shape:
-        raise UnusableFile(f"holds samples {data.shape} where its header says {shape}")
+def _si_samples(stored: SpectralData, order: Order) -> tuple[np.ndarray | StoredSamples, list[str]]:
+    """Return the samples in SI units, float32, checked block by block, and notes.
+
+    Samples whose rows can be read by themselves stay in the file.
+    """
+    shape = (*stored.shape, len(stored.wavelengths[order]))
+    samples = _place(stored, order)
     wavelengths = stored.wavelengths[order]
     bands = np.shape(stored.wavelengths)
     gain, offset = (np.broadcast_to(v, bands)[order] for v in (stored.gain, stored.offset))
-    out = np.empty((*stored.shape, len(wavelengths)), np.float32)
+
+    def read(start: int, stop: int) -> tuple[np.ndarray, int]:
+        if stored.read_rows is not None:
+            rows = stored.read_rows(start, stop)
+        else:
+            rows = samples.stored[start:stop]
+        return _si_block(rows[:, :, order], gain, offset, stored.no_data)
+
+    def read_checked(start: int, stop: int) -> np.ndarray:
+        block = read(start, stop)[0]
+        np.maximum(block, 0, out=block)
+        return block
+
     lowest, largest, below, missing = 0.0, 0.0, 0, 0
-    for top in range(0, len(out), _BLOCK):
-        rows = slice(top, top + _BLOCK)
-        block = np.asarray(data[rows])[:, :, order]
-        out[rows], gaps = _si_block(block, gain, offset, stored.no_data)
-        low, high = float(out[rows].min()), float(out[rows].max())
+    for top in range(0, shape[0], _BLOCK):
+        block, gaps = read(top, min(top + _BLOCK, shape[0]))
+        low, high = float(block.min()), float(block.max())
         if not (np.isfinite(low) and np.isfinite(high)):
-            raise _not_finite(out[rows], top, wavelengths)
+            raise _not_finite(block, top, wavelengths)
         if low < 0:
-            below += int(np.count_nonzero(out[rows] < 0))
-            np.maximum(out[rows], 0, out=out[rows])
+            below += int(np.count_nonzero(block < 0))
+            np.maximum(block, 0, out=block)
+        if stored.read_rows is None:
+            samples.si[top : top + _BLOCK] = block
         lowest, largest, missing = min(lowest, low), max(largest, high), missing + gaps
     if largest > MOST_LIGHT:
         raise UnusableFile(
@@ -231,7 +251,30 @@ def _si_samples(stored: SpectralData, order: Order) -> tuple[np.ndarray, list[st
             "light is 0 or more",
             "replace such values, for example by 0",
         )
-    return out, list(_remarks(stored, lowest, largest, below, missing, out.size))
+    found = samples.si if stored.read_rows is None else StoredSamples(read_checked, shape)
+    return found, list(_remarks(stored, lowest, largest, below, missing, math.prod(shape)))
+
+
+@dataclass(frozen=True)
+class _Place:
+    stored: np.ndarray
+    """Values (h, w, bands) as the file has them."""
+    si: np.ndarray
+    """Where those in SI units go: the same memory where they fit in."""
+
+
+def _place(stored: SpectralData, order: Order) -> _Place:
+    """Return the values of a file that is read whole; none of one that is read in strips."""
+    if stored.read_rows is not None:
+        return _Place(*[np.empty((0, 0, 0), np.float32)] * 2)
+    data = np.asarray(stored.read())
+    shape = (*stored.shape, len(stored.wavelengths))
+    if data.shape != shape:
+        raise UnusableFile(f"holds samples {data.shape} where its header says {shape}")
+    bands = len(stored.wavelengths[order])
+    flags = data.flags
+    fits = flags.writeable and flags.c_contiguous and data.dtype == np.float32 and bands == shape[2]
+    return _Place(data, data if fits else np.empty((*stored.shape, bands), np.float32))
 
 
 def _si_block(
