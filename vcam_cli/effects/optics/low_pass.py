@@ -28,10 +28,7 @@ Vectors = tuple[tuple[float, float], ...]
 
 
 class LowPass(Effect):
-    """Displaced copies of the image, by a birefringent filter on the sensor.
-
-    `from_camera` selects the computation.
-    """
+    """Displaced copies of the image, by a birefringent filter on the sensor."""
 
     name = "low_pass"
     reference = "J. E. Greivenkamp, Appl. Opt. 29, 676, 1990 (optical prefilters)"

@@ -31,10 +31,7 @@ from vcam_cli.physics.motion_blur import path_transfer
 
 
 class Motion(Effect):
-    """Motion of the scene or the camera during the exposure: blur, skew and wobble.
-
-    `from_camera` selects the computation.
-    """
+    """Motion of the scene or the camera during the exposure: blur, skew and wobble."""
 
     name = "motion"
     reference = "mean over the path: Bracewell, The Fourier Transform and Its Applications, 2000"
