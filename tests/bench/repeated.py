@@ -10,9 +10,15 @@ import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from vcam_cli import load, simulate, sweep
 from vcam_cli.camera.camera import Camera
+from vcam_cli.datasets import dataset_file
+from vcam_cli.datasets.dataset import dataset
+from vcam_cli.files.images.png import write_png
 from vcam_cli.simulation.shared import RECENT, Shared
+from vcam_cli.sweeps.execution import Execution
 
 from .measure import Cost, run_cost, start_cost, take_turns
 
@@ -34,9 +40,16 @@ COMMANDS = {
 """Command -> its arguments, and its processor time over bare imports before."""
 
 
-def repeated(repeats: int, count: int = 12, points: int = 200) -> dict[str, dict[str, Row]]:
-    """Loops over single frames, a sweep over its loop, commands over the imports of libraries."""
+def repeated(
+    repeats: int, count: int = 12, points: int = 200, frames: int = 400
+) -> dict[str, dict[str, Row]]:
+    """Small frames of data sets, loops over single frames, a sweep over its loop, commands."""
     return {
+        f"a data set of {frames} frames, four a scene, over NumPy's noise of as many": {
+            f"{size} x {size} pixels": _small_frames(repeats, size, max(4, number))
+            | {"before": before}
+            for size, number, before in ((64, frames, 100.0), (512, frames // 16, 5.2))
+        },
         f"loops of {count}, over as many frames alone": _loops(repeats, count),
         f"a sweep of {points} frames of 32 x 32 pixels, over a loop": _small_sweep(repeats, points),
         f"commands over the imports of {', '.join(IMPORTS)}": _commands(repeats),
@@ -102,6 +115,38 @@ def _small_sweep(repeats: int, points: int) -> dict[str, Row]:
 
         one, other = take_turns(repeats, swept, looped)
     return {"points": one.ratio(other) | {"before": 2.0}}
+
+
+def _small_frames(repeats: int, size: int, frames: int) -> Row:
+    """Noisy and clean frames of photographs, written and packed, over the noise of a mean."""
+    random = np.random.default_rng(1)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for number in range(4):
+            coarse = random.integers(0, 256, (40, 40, 3), np.uint8)
+            write_png(folder / f"{number}.png", coarse.repeat(20, axis=0).repeat(20, axis=1))
+        study = folder / "study.yaml"
+        study.write_text(
+            "kind: dataset\nname: small\ncamera: starter\n"
+            "scenes: {files: '*.png', frames_each: 4}\n"
+            "vary: {exposure.time: {log_uniform: [1 ms, 20 ms]}, exposure.gain: {choice: [1, 4]}}\n"
+            f"frames: {frames}\nsize: {{rows: {size}, columns: {size}}}\n"
+        )
+
+        def made() -> Cost:
+            file = dataset_file.read(study)
+            return run_cost(lambda: dataset(file, folder / "out", Execution(workers=1, fresh=True)))
+
+        mean = random.uniform(100, 2000, (size, size))
+
+        def noise() -> None:
+            for _ in range(frames):
+                charge = random.poisson(mean) + 5 * random.standard_normal(mean.shape, np.float32)
+                charge += 2 * random.standard_normal(mean.shape, np.float32)
+                np.clip(np.rint(charge / 20 + 64), 0, 1023).astype(np.uint16)
+
+        one, other = take_turns(repeats, made, lambda: run_cost(noise))
+    return one.ratio(other)
 
 
 def _commands(repeats: int) -> dict[str, Row]:

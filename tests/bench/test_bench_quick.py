@@ -24,7 +24,7 @@ TINY = Size(
     plain_scenes=("color",),
     wavelengths=31,
     points=20,
-    repeated=(2, 4),
+    repeated=(2, 4, 8),
     levels=64,
     effects=("shot_noise", "off_axis"),
     scenes=(),
@@ -66,11 +66,11 @@ def test_every_part_is_there(found):
     titles = " ".join(found["sections"])
     for word in (
         "frame over R_compute", "shares", "shipped", "photograph", "eight layers",
-        "plain NumPy", "wavelengths", "without", "sweep", "growth", "schedules", "command",
+        "plain NumPy", "wavelengths", "without", "sweep", "growth", "schedules", "command", "data set",
     ):  # fmt: skip
         assert word in titles
-    # Frames have their shares besides, and layers another denominator.
-    assert len(PARTS) == len(found["sections"]) - 2
+    # Frames have their shares besides, layers another denominator, and what is repeated four.
+    assert len(PARTS) == len(found["sections"]) - 5
     assert set(found["sections"]["frame over the same without"]) == set(TINY.effects)
     (camera,) = found["sections"]["frame time over R_compute, shipped cameras"]
     assert camera.startswith("csf-monochrome, ")

@@ -37,7 +37,7 @@ class Size:
     wavelengths: int = 31
     points: int = 20
     levels: int = 65_536
-    repeated: tuple[int, int] = (12, 200)
+    repeated: tuple[int, int, int] = (12, 200, 400)
     """Frames of a loop, and points of a sweep of small frames."""
     effects: tuple[str, ...] = ()
     """Some of the effects; () for all."""
