@@ -17,7 +17,7 @@ FINEST = 4.0
 """Frequency up to which the edges of samples count, at least [cycles per pixel]. On samples in line
 with the pixels those beyond add a tenth to what blurs of a tenth of a pixel change."""
 BLOCKS = 64
-"""Groups of neighboring terms of a spectrum along an axis; the lowest frequencies stay single."""
+"""Blocks of neighboring terms of a spectrum along an axis, beside its lowest terms."""
 
 
 @dataclass(frozen=True)

@@ -162,7 +162,7 @@ class SharpImage:
         self._known: dict[tuple[int, tuple[int, int]], Array] = {}
 
     def groups(self, rays: Array) -> list[Array]:
-        """Return rays in groups; about the same waves diffract in all rays of a group.
+        """Return rays in groups; in a group about the same waves diffract.
 
         Parameters
         ----------
