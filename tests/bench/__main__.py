@@ -17,7 +17,7 @@ standard normal per pixel for each of five noise sources. The parts, by default 
     growth       how time grows with pixels
     schedules    best sampling schedules, over R_compute
     command      `vcam run` beside the bare imports
-    repeated     data sets, loops, sweeps of small frames, commands without a frame; and the same before
+    repeated     data sets, loops, sweeps of small frames, commands without frames, old and new
 
 Figures are medians of repeated runs in one process, once by the wall clock and once by the time of
 all processors. --quick: small frames, one run each, fewer effects and cameras: to see that it

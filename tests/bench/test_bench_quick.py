@@ -66,7 +66,8 @@ def test_every_part_is_there(found):
     titles = " ".join(found["sections"])
     for word in (
         "frame over R_compute", "shares", "shipped", "photograph", "eight layers",
-        "plain NumPy", "wavelengths", "without", "sweep", "growth", "schedules", "command", "data set",
+        "plain NumPy", "wavelengths", "without", "sweep", "growth", "schedules", "command",
+        "data set",
     ):  # fmt: skip
         assert word in titles
     # Frames have their shares besides, layers another denominator, and what is repeated four.

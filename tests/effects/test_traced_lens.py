@@ -143,6 +143,7 @@ def test_falloff_is_the_pupils_area():
 
 
 WRONG = {
+    "scene.wavelengths={start: 200 nm, stop: 700 nm}": "is known from",
     "optics.prescription=dubble-gauss": "did you mean 'double-gauss'?",
     "optics.f_number=2.8": "cannot be combined with prescription",
     "optics.zernike={4: 0.1 um}": "cannot be combined with prescription",

@@ -20,6 +20,7 @@ from vcam_cli.image_formation.optical_path import LayerOptics
 from vcam_cli.physics import zernike
 from vcam_cli.physics.aberration import otf_ratio_symmetric
 from vcam_cli.physics.diffraction import otf_circular
+from vcam_cli.physics.opening import Opening
 
 LARGE = {"array.rows": 150, "array.columns": 190}
 """So that there are some windows."""
@@ -326,3 +327,18 @@ def test_what_a_cut_margin_changes_is_predicted(f_number, tmp_path, monkeypatch)
     off = float(np.sqrt(np.square(found[0] - found[1]).mean())) / found[1].max()
     assert 1e-3 < off <= predicted[0]
     assert predicted[1] < 1e-3
+
+
+def test_rays_fill_an_aperture_that_is_no_circle():
+    opening = Opening(5, 0.2, 0.3, 3, 0.03)
+    at = (np.arange(1000) + 0.5) / 500 - 1
+    x, y = (a.ravel() for a in np.meshgrid(at, at))
+    inside = opening.contains(x, y)
+    for kind in (0, 1):
+        found = rays(4000, kind, opening)
+        assert len(found) == pytest.approx(4000, rel=0.01)
+        assert opening.contains(found[:, 0], found[:, 1]).all()
+        for power in ((1, 0), (0, 1), (2, 0), (1, 1), (0, 2)):
+            expected = np.mean(x[inside] ** power[0] * y[inside] ** power[1])
+            mean = np.mean(found[:, 0] ** power[0] * found[:, 1] ** power[1])
+            assert mean == pytest.approx(expected, abs=3e-3)

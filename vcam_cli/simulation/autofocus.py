@@ -47,10 +47,10 @@ TOLERANCE = 1e-3
 """Of the trials, relative to full signal: near the best place the contrast hardly changes."""
 GOLDEN = (np.sqrt(5) - 1) / 2
 MOVES = 6
-"""Moves by phase, at most: half images of another shape than each other tell less at first."""
+"""Moves by phase, at most: half images that differ in shape show less at first."""
 LEAST_DETAIL = 4e-4
-"""Gradient of the light along rows, over its mean, of which the fivefold tells something: twice the
-tolerance of the trials."""
+"""Gradient of the light along rows, over its mean. Half images show a displacement where it is five
+times this: twice the tolerance of the trials."""
 SEEN = 0.02
 """Disparity that counts as none, over the distance of pixels of one half: half images tell it so
 exactly."""

@@ -131,9 +131,18 @@ def _picture(ready: Prepared) -> AnyScene:
 
 
 def _prescription(ready: Prepared) -> tuple[str, ...]:
-    """Return what the file of a traced lens says and the simulation ignores."""
+    """Return which data of a traced lens the simulation ignores, and how many rays fail."""
     found = (effect for effect in ready.solved.effects.found.values() if effect is not None)
-    return tuple(note for blur in of_kind(found, TracedBlur) for note in blur.view.lens.remarks)
+    notes: list[str] = []
+    for blur in of_kind(found, TracedBlur):
+        notes += blur.view.lens.remarks
+        if failing := blur.failing:
+            height, lost = max(failing, key=lambda place: place[1])
+            notes.append(
+                f"{100 * lost:.2g} % of the rays through the stop fail {height * 1e3:.4g} mm off"
+                " axis: the pupil ends where they do"
+            )
+    return tuple(notes)
 
 
 def _blind_colors(ready: Prepared) -> tuple[str, ...]:

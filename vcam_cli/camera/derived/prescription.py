@@ -32,6 +32,8 @@ TABLE_HEIGHTS = 129
 COLOR_HEIGHTS, COLOR_WAVELENGTHS = 12, 13
 """Image heights and wavelengths from which the magnification by wavelength follows."""
 FOCUS_RAYS = 24
+SAME = 1e-9
+"""Part of a wavelength that is a rounding error."""
 
 
 @dataclass(frozen=True)
@@ -114,10 +116,25 @@ def traced_lens(camera: CameraModel) -> TracedLens | None:
     if given is None:
         return None
     lens = _read(given)
+    _require_wavelengths(lens, camera.scene.wavelengths.start, camera.scene.wavelengths.stop)
     focus = camera.optics.focus_distance
     if focus is None:
         focus = camera.scene.distance
     return TracedLens(lens, focus, given.image_plane)
+
+
+def _require_wavelengths(lens: Prescription, start: float, stop: float) -> None:
+    """Raise BadInput where a glass is not known at all simulated wavelengths [m]."""
+    for surface in lens.surfaces:
+        low, high = surface.glass.range
+        if start < low * (1 - SAME) or stop > high * (1 + SAME):
+            raise bad(
+                "scene.wavelengths",
+                f"{surface.glass.name}, a glass of {lens.name}, is known from {low * 1e9:.4g} to"
+                f" {high * 1e9:.4g} nm, and {start * 1e9:.4g} to {stop * 1e9:.4g} nm are simulated",
+                f"write scene.wavelengths: {{start: {max(low, start) * 1e9:.4g} nm,"
+                f" stop: {min(high, stop) * 1e9:.4g} nm}}",
+            )
 
 
 def _read(given: Given) -> Prescription:

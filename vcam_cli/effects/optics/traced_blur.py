@@ -319,6 +319,14 @@ class TracedBlur(AberrationBlur, FieldTransfer):
         )
 
     @property
+    def failing(self) -> tuple[tuple[float, float], ...]:
+        """Share of the rays through the stop that fail, by image height [m], where any do."""
+        places = self._places(FEWEST_PLACES)
+        known = places[0].wavefront.field
+        listed = zip(known.heights.tolist(), known.lost.tolist(), strict=True)
+        return tuple((height, lost) for height, lost in listed if lost > 0)
+
+    @property
     def table_seconds(self) -> float:
         """Core seconds of the grids of all places and wavelengths."""
         if not self.diffracts:
