@@ -29,7 +29,7 @@ from vcam_cli.floats import own_float_errors
 from vcam_cli.parallel import suitable_workers
 from vcam_cli.processing.demosaic import bilinear_rows
 from vcam_cli.readout import auto_exposure, exposure
-from vcam_cli.simulation.checks import read_lens
+from vcam_cli.simulation.reading import with_own_files
 from vcam_cli.solve.solved import Solved, solve
 
 Numbers = Sequence[float] | Callable[[int], float] | float | None
@@ -261,8 +261,7 @@ def solved_for(camera: Camera) -> Solved:
         update={"source": source.model_copy(update={"crop": None, "depth": None})}
     )
     camera = with_effects(camera.model_copy(update={"scene": scene}), "all")
-    samples = read_lens(camera)
-    return solve(camera.with_samples(samples) if samples else camera)
+    return solve(with_own_files(camera))
 
 
 def ready(

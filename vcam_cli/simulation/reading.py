@@ -41,13 +41,23 @@ def read_camera(
     """
     camera = with_flat_scene(camera)  # one layer alone is flat
     with stages("read"):
-        samples = read_lens(camera) | read_maps(camera)
-    if samples:
-        camera = camera.with_samples(samples)
+        camera = with_own_files(camera)
     found = shared.picture(camera, lambda: read_scene(camera, stages))
     solved = solve(camera)
     picture, notes = _completed(solved, *found)
     return solved, picture, notes
+
+
+def with_own_files(camera: Camera) -> Camera:
+    """Return a camera with what the files of its lens and of its pixels hold.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera.
+    """
+    samples = read_lens(camera) | read_maps(camera)
+    return camera.with_samples(samples) if samples else camera
 
 
 def _completed(solved: Solved, picture: Any, notes: tuple[str, ...]) -> tuple[Any, tuple[str, ...]]:

@@ -94,22 +94,30 @@ class PatternMaps(NoiseSource):
 
     def before_shot(self, mean: Array, site: Site) -> Array:
         """Return the mean signal with dark currents in it; it reuses the array [electrons]."""
-        dark = self.maps[2]
-        if dark is not None and site.dark:
-            mean += mean.dtype.type(site.dark) * dark[site.first_row : site.first_row + site.rows]
+        if self.maps[2] is not None and site.has_dark:
+            mean += self._map(site, 2).astype(mean.dtype, copy=False) * site.dark
         return mean
 
     def apply(self, electrons: Array, site: Site) -> Array:
         """Return the block with gains and offsets in it; it reuses the array [electrons]."""
         if any(f is not None and m is None for f, m in zip(self.files, self.maps, strict=True)):
             raise RuntimeError(f"{', '.join(filter(None, self.files))}: not read")
-        rows = slice(site.first_row, site.first_row + site.rows)
         offset, gain, _ = self.maps
         if gain is not None:
-            electrons *= 1 + gain[rows]
+            electrons *= 1 + self._map(site, 1)
         if offset is not None:
-            electrons += offset[rows]
+            electrons += self._map(site, 0)
         return electrons
+
+    def _map(self, site: Site, number: int) -> Array:
+        """Return the rows of a block of a map: of offsets, gains or dark currents."""
+        whole = self.maps[number]
+        assert whole is not None
+
+        def rows(here: Site) -> Array:
+            return whole[here.first_row : here.first_row + here.rows]
+
+        return site.sensor_map(f"{self.name} {MAPS[number]}", rows)
 
     def variance(self, mean: float, dark: float = 0.0) -> float:
         """Return the variance over the array that it adds [electrons squared].
