@@ -4,6 +4,7 @@
     python -m tests.gpu check        checks and statistics
     python -m tests.gpu commands     every command with --device gpu
     python -m tests.gpu bench        bench
+    python -m tests.gpu written      bench of a data set that is written
 
 Each check stands alone: one that fails hides no other. The exit status is 1 where one failed.
 """
@@ -312,6 +313,35 @@ def seconds(device: Processor, function: Callable[[], object], repeats: int = 5)
     return float(least)
 
 
+def row(name: str, value: float, unit: str, said: str = "") -> None:
+    """Print a number."""
+    print(f"{name:58s} {value:12.5g} {unit}{'  ' + said if said else ''}", flush=True)
+
+
+def written() -> None:
+    """Print how many pairs of a data set are written in a second, and the disk's speed."""
+    from vcam_cli import dataset
+    from vcam_cli.files.images.png import write_png
+
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder)
+        for number in range(8):
+            write_png(place / f"p{number}.png", photograph(1000, 1400, number))
+        (place / "set.yaml").write_text(DATASET)
+        start = time.perf_counter()
+        with (place / "raw").open("wb", buffering=0) as file:
+            block = np.random.default_rng(0).bytes(1 << 26)
+            for _ in range(8):
+                file.write(block)
+        speed = 8 * len(block) / (time.perf_counter() - start)
+        row("disk, one file", speed / 1e6, "MB/s")
+        start = time.perf_counter()
+        found = dataset(place / "set.yaml", place / "out", device="gpu")
+        spent = time.perf_counter() - start
+        assert found.failed == 0
+        row("512² data set, written shards: pairs a second", found.frames / spent, "1/s")
+
+
 def bench(device: Processor) -> None:
     """Print seconds and ratios."""
     import cupy
@@ -326,9 +356,6 @@ def bench(device: Processor) -> None:
             done += len(batch)
         device.wait()
         return done / (time.perf_counter() - start)
-
-    def row(name: str, value: float, unit: str, said: str = "") -> None:
-        print(f"{name:58s} {value:12.5g} {unit}{'  ' + said if said else ''}", flush=True)
 
     def small() -> None:
         count, side = 64, 512
@@ -435,28 +462,6 @@ def bench(device: Processor) -> None:
             "aim 200",
         )
 
-    def written() -> None:
-        from vcam_cli import dataset
-        from vcam_cli.files.images.png import write_png
-
-        with tempfile.TemporaryDirectory() as folder:
-            place = Path(folder)
-            for number in range(8):
-                write_png(place / f"p{number}.png", photograph(1000, 1400, number))
-            (place / "set.yaml").write_text(DATASET)
-            start = time.perf_counter()
-            with (place / "raw").open("wb", buffering=0) as file:
-                block = np.random.default_rng(0).bytes(1 << 26)
-                for _ in range(8):
-                    file.write(block)
-            speed = 8 * len(block) / (time.perf_counter() - start)
-            row("disk, one file", speed / 1e6, "MB/s")
-            start = time.perf_counter()
-            found = dataset(place / "set.yaml", place / "out", device="gpu")
-            spent = time.perf_counter() - start
-            assert found.failed == 0
-            row("512² data set, written shards: pairs a second", found.frames / spent, "1/s")
-
     def host_time() -> None:
         """Seconds of Python for a batch: pixels are few."""
         model = camera("starter", 16, 16, "exposure.time=10 ms")
@@ -470,7 +475,6 @@ def bench(device: Processor) -> None:
         asked.pop("gains")
         row("   with times", 64e3 / rate(frames(model, pictures, device=device, **asked)), "ms")
 
-    check("bench written", written)
     check("bench of Python", host_time)
     for name, function in (("bench 512²", small), ("bench 12 MP", large), ("bench 1 MP", sequence)):
         check(name, function)
@@ -478,7 +482,7 @@ def bench(device: Processor) -> None:
 
 def main() -> int:
     """Run what was asked for."""
-    asked = sys.argv[1:] or ["check", "commands", "bench"]
+    asked = sys.argv[1:] or ["check", "commands", "bench", "written"]
     start = time.perf_counter()
     device = open_device("gpu")
     print(device.describe(), f"{device.free_memory() / 1e9:.1f} GB may be used", flush=True)
@@ -504,6 +508,8 @@ def main() -> int:
         commands()
     if "bench" in asked:
         bench(device)
+    if "written" in asked:
+        check("bench of shards", written)
     print(f"{len(failed)} failed {failed}; {time.perf_counter() - start:.1f} s", flush=True)
     return bool(failed)
 
