@@ -86,7 +86,7 @@ def test_slopes_in_line_with_the_pixels(seed, tmp_path):
 
 
 def test_cameras_with_every_effect(tmp_path):
-    """Twelve at first, fourteen more for what lenses and pixels do; random ones have layers."""
-    assert len(CAMERAS) == 26
+    """Twelve at first, fifteen more for what lenses and pixels do; random ones have layers."""
+    assert len(CAMERAS) == 27
     named = {name for each in CAMERAS for name in ablation.wanted_effects(made(each, tmp_path))}
     assert named == {kind.name for kind in ORDER} - {"depth"}
