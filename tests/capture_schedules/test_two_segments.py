@@ -99,7 +99,7 @@ density: [histogram, kernel, nearest-neighbor, penalized-likelihood]
     [
         ("pdf: {uniform: {min: 0, max: 1}}\nsegments: 2\ndensity: kernel", "counts pixels"),
         ("pdf: {uniform: {min: 0, max: 1}}\ndensity: kernel", "has no effect"),
-        ("pdf: {uniform: {min: 0, max: 1}}\nsegments: 2\ndensity: kernel", "kernel"),
+        ("pdf: {uniform: {min: 0, max: 1}}\nsegments: 2\ndensity: kernels", "kernel"),
     ],
 )
 def test_what_cannot_act_is_refused(tmp_path, text, wanted):
