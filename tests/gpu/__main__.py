@@ -35,10 +35,10 @@ scenes: {files: "*.png", frames_each: 4}
 vary:
   exposure.time: {log_uniform: [1 ms, 30 ms]}
   exposure.gain: {choice: [1, 2, 4, 8]}
-frames: 4096
+frames: 1024
 size: {rows: 512, columns: 512}
 write: [raw, clean]
-shards: 16
+shards: 4
 """
 MEAN = 1e-5
 """Difference from the processor's mean signal that is allowed, over full signal."""
@@ -273,7 +273,7 @@ def commands() -> None:
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         write_png(place / "p.png", photograph(1000, 1400))
-        text = DATASET.replace("512", "64").replace("4096", "64").replace("shards: 16", "shards: 2")
+        text = DATASET.replace("512", "64").replace("1024", "64").replace("shards: 4", "shards: 2")
         (place / "set.yaml").write_text(text)
         for words in (
             ("run", "starter", *small),
@@ -335,11 +335,15 @@ def written() -> None:
                 file.write(block)
         speed = 8 * len(block) / (time.perf_counter() - start)
         row("disk, one file", speed / 1e6, "MB/s")
-        start = time.perf_counter()
-        found = dataset(place / "set.yaml", place / "out", device="gpu")
-        spent = time.perf_counter() - start
-        assert found.failed == 0
-        row("512² data set, written shards: pairs a second", found.frames / spent, "1/s")
+        for workers in (1, 2, 4, 8):
+            start = time.perf_counter()
+            found = dataset(
+                place / "set.yaml", place / f"out{workers}", workers=workers, device="gpu"
+            )
+            spent = time.perf_counter() - start
+            assert found.failed == 0
+            what = f"512² data set, written shards, {workers} processes: pairs a second"
+            row(what, found.frames / spent, "1/s", f"{spent:.1f} s")
 
 
 def bench(device: Processor) -> None:
