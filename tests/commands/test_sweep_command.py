@@ -176,7 +176,7 @@ def test_a_full_disk_ends_with_3(monkeypatch):
 
 
 def test_ctrl_c_says_that_points_are_kept():
-    write(vary={"pixel.width": {"start": "4 um", "stop": "6 um", "count": 200}})
+    write(vary={"pixel.width": {"start": "4 um", "stop": "6 um", "count": 2000}})
     command = [sys.executable, "-m", "vcam_cli.commands.main", "sweep", "study.yaml"]
     root = str(Path(module.__file__).parents[2])
     size = ["--set", "array.rows=90", "--set", "array.columns=90"]  # so that it lasts

@@ -341,7 +341,7 @@ def test_whole_numbers_are_meters_and_that_is_said(tmp_path):
     np.save(tmp_path / "z.npy", np.where(np.eye(64), 1, 3).astype(np.uint16))
     source = picture(tmp_path) | {"depth": str(tmp_path / "z.npy")}
     result = simulate(camera(tmp_path, STILL | FLAT | {"scene.source": source}))
-    assert any("taken as meters" in note and "unit: 1 mm" in note for note in result.notes)
+    assert any("read as meters" in note and "unit: 1 mm" in note for note in result.notes)
     assert result.frame.scene.distances == pytest.approx([1.0, 3.0])
 
 

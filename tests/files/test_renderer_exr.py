@@ -90,10 +90,10 @@ def test_a_file_may_end_where_the_camera_hardly_sees(tmp_path):
             "scene.radiance": GONE, "scene.luminance": "from-file"})  # fmt: skip
         shots[stop] = simulate(checks.load(tmp_path / "made.yaml"))
         assert found.scene.source.channels is not None
-    notes = [note for note in shots[730].notes if "taken as 0" in note]
+    notes = [note for note in shots[730].notes if "set to 0" in note]
     assert len(notes) == 1
     assert "covers 380 to 730 nm" in notes[0]
-    assert not any("taken as 0" in note for note in shots[780].notes)
+    assert not any("set to 0" in note for note in shots[780].notes)
     # The filter passes 5e-4 at 710 nm and nothing at 750 nm.
     np.testing.assert_allclose(shots[730].mean_electrons, shots[780].mean_electrons, rtol=1e-5)
 

@@ -11,7 +11,7 @@ from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.effects.optics.stray_light import StrayLight
 from vcam_cli.effects.pixel.dark_current import DarkCurrent
 from vcam_cli.effects.pixel.saturation import Saturation
-from vcam_cli.effects.pixel_signal import Gain
+from vcam_cli.effects.pixel_signal import NeutralGain
 from vcam_cli.image_formation.pixelwise import changes_by_omission
 
 TIME, DARK, WELL = 0.5, 300.0, 500.0
@@ -19,7 +19,7 @@ MOSAIC = Mosaic((("R", "G"), ("G", "B")))
 
 
 @dataclass(frozen=True)
-class Ramp(Gain):
+class Ramp(NeutralGain):
     """A factor that rises from left to right by `slope` a meter."""
 
     name: str

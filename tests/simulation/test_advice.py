@@ -41,7 +41,7 @@ def test_infrared_light_that_nothing_cuts_off_is_told(tmp_path):
 
 def test_a_render_that_an_overexposure_darkens_is_told(tmp_path):
     bright = {"scene.radiance": radiance_for(400e3), "processing": [{"gamma": "srgb"}]}
-    [note] = told(tmp_path, bright, "the scene's white is 4 times what saturates a pixel")
+    [note] = told(tmp_path, bright, "the scene's white is 4 times the saturation level")
     assert "25 % of white" in note
     assert "tone: {white: sensor}" in note
     result = simulate(camera(tmp_path, bright))

@@ -99,7 +99,7 @@ def test_following_is_said_to_change_nothing_in_a_single_frame(tmp_path, monkeyp
     made = camera(tmp_path, small | {"exposure": {"auto": {"max": "20 ms", "follow": 0.2}}})
     said = [note for note in simulate(made).notes if "exposure.auto.follow" in note]
     assert len(said) == 1
-    assert "in sequences alone" in said[0]
+    assert "only in sequences" in said[0]
     with OutputFolder(tmp_path / "out") as folder:
         first = write_sequence(made, 2, RATE, folder, None, Silent())
     assert not [note for note in first.notes if "exposure.auto.follow" in note]

@@ -107,7 +107,10 @@ def test_the_same_camera_gives_the_same_bytes(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "why"),
     [
-        ({"array.pattern": "honeycomb", "array.filters": "generic-rgb"}, "rows and columns alone"),
+        (
+            {"array.pattern": "honeycomb", "array.filters": "generic-rgb"},
+            "only pixels in rows and columns",
+        ),
         (
             {"pixel.readout": {"full_well": "10 ke"}, "pixel.photodetector.fill_factor": 0.5},
             "hold volts, which are unknown",

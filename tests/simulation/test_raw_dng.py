@@ -284,7 +284,7 @@ def test_patterns_that_readers_get_wrong_are_refused(pattern, tmp_path):
 
 @pytest.mark.parametrize("block", [["RG", "BG"], ["RW", "WB"], ["GR", "BG", "GR", "BG"], ["RGB"]])
 def test_blocks_other_than_bayers_are_refused_and_bayers_are_not(block, tmp_path):
-    with pytest.raises(BadInput, match=r"output.dng.*wrong"):
+    with pytest.raises(BadInput, match=r"output.dng.*misread"):
         _checked(tmp_path, {"array.pattern": {"block": [list(row) for row in block]}})
     _checked(tmp_path, {"array.pattern": {"block": [["G", "B"], ["R", "G"]]}})
 

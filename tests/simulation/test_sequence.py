@@ -82,8 +82,8 @@ def test_memory_stays_and_still_scenes_have_one_light(speed, lights, tmp_path, m
     """Frames of 12 kB, of which 30 kB are kept: two, however many follow each other."""
     kept, found, true = [], [], sequence.simulate
 
-    def watched(each, workers, watch, shared, before):
-        result = true(each, workers, watch, shared, before)
+    def watched(each, workers, watch, shared, device, before):
+        result = true(each, workers, watch, shared, device, before)
         kept.append(shared.rate_cache.nbytes)
         found.append(id(result.frame.rate))
         lasting.append(result)

@@ -118,7 +118,7 @@ def test_a_point_that_failed_leaves_it_unknown(tmp_path):
     ("wrong", "place", "said"),
     [
         ({"quantity": "optimun"}, "quantity", "optimum"),
-        ({"quantity": "optimum", "at": "4 um"}, "at", "no place of its own"),
+        ({"quantity": "optimum", "at": "4 um"}, "at", "has no place"),
         ({"quantity": "optimum", "case": "big"}, "case", "big"),
         ({"quantity": "optimum", "minus": "big"}, "minus", "big"),
         ({"quantity": "mean_electrons"}, "at", "missing"),

@@ -117,7 +117,8 @@ def test_what_listens_may_be_another_program(greeting, tmp_path, monkeypatch):
         def greet():
             with suppress(OSError):
                 while True:
-                    server.accept()[0].sendall(greeting)
+                    with server.accept()[0] as link:
+                        link.sendall(greeting)
 
         Thread(target=greet, daemon=True).start()
         address = f"tcp://127.0.0.1:{server.getsockname()[1]}"

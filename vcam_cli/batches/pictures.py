@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from vcam_cli.camera.scene.scene_files import ImageFile
 from vcam_cli.devices.processor import Processor
 from vcam_cli.errors import bad
 from vcam_cli.files.images.color import decode_srgb
+from vcam_cli.parallel import ThreadPool
 
 Places = Sequence[tuple[int, int]] | Callable[[int], tuple[int, int]] | None
 """Top row and left column of each picture's crop, or what gives them by its number; None: in the
@@ -105,7 +105,7 @@ def _read_ahead(pictures: Iterable[Any], camera: Camera, count: int) -> Iterator
         return picture
 
     coming = iter(pictures)
-    with ThreadPoolExecutor(max(1, min(8, count))) as pool:
+    with ThreadPool(max(1, min(8, count))) as pool:
         waiting = [pool.submit(read, picture) for picture in islice(coming, 2 * count)]
         while waiting:
             yield waiting.pop(0).result()

@@ -201,11 +201,10 @@ class CameraModel(FileModel):
     def _lag_mistakes(self) -> Iterator[InitErrorDetails]:
         """Yield why lag of these pixels cannot be simulated."""
         readout, exposure = self.pixel.readout, self.exposure
-        several = bool(readout.gains) or readout.small is not None
         for refused, what, remedy in (
             (exposure.captures, "several captures of one integration", "give one time"),
             (exposure.bracket, "a bracket", "give one time"),
-            (several, "several readouts of one exposure", "remove readout.gains and readout.small"),
+            (readout.has_several, "several readouts of one exposure", ONE_READOUT),
             (self.pixel.phase_detection, "phase detection", "remove phase_detection"),
         ):
             if self.pixel.lag and refused:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -20,6 +19,7 @@ from vcam_cli.effects.signal_chain import NoiseSource
 from vcam_cli.errors import BadInput
 from vcam_cli.files.frame_archive import archive_bytes, array_hash
 from vcam_cli.image_formation.rate_cache import RateCache
+from vcam_cli.parallel import ThreadPool
 from vcam_cli.physics.cache import ByteCache
 from vcam_cli.quality.photon_transfer import ROUNDING
 from vcam_cli.readout.chain import ReadoutChain
@@ -111,7 +111,7 @@ class FramesJob:
             key = batch_key(frame, self.write)
             if frame.number in self.numbers and key is not None:
                 batches.setdefault(key, []).append(frame)
-        with ThreadPoolExecutor(HASHERS) as pool:
+        with ThreadPool(HASHERS) as pool:
             for frames in batches.values():
                 left, hashing = {frame.number for frame in frames}, []
                 try:
