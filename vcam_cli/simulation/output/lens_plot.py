@@ -73,7 +73,9 @@ def _draw_section(axes: Any, page: LensPage) -> None:
     axes.set_aspect("equal")
     axes.grid(False)
     axes.set_xlabel("z [mm]")
-    axes.legend(loc="lower left", fontsize=SMALL, ncols=3)
+    axes.set_ylabel(" ")  # keeps room for the numbers, which the aspect widens after the layout
+    axes.set_title("y [mm]", loc="left", fontsize=SMALL)
+    axes.legend(loc="upper right", bbox_to_anchor=(1.0, 1.14), fontsize=SMALL, ncols=3)
 
 
 def _write_facts(axes: Any, page: LensPage) -> None:
