@@ -1,6 +1,6 @@
 """`vcam dataset`: labeled frames for learning and testing."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,12 +12,23 @@ from vcam_cli.interrupts import INTERRUPTED, restore_interrupt
 if TYPE_CHECKING:
     from vcam_cli.datasets.dataset import DatasetResult
 
+Seed = Annotated[
+    int | None,
+    typer.Option(
+        "--seed",
+        metavar="N",
+        min=0,
+        help="Seed of all draws: scenes, crops, parameters, frame seeds; the sensor's fixed pattern "
+        "stays.",
+    ),
+]
+
 
 def dataset(
     study: options.Study,
     out: options.Out = None,
     set_: options.Set = None,
-    seed: options.Seed = None,
+    seed: Seed = None,
     accuracy: options.Accuracy = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -31,7 +42,7 @@ def dataset(
 
     Write shards of raw codes with and without noise, manifest.csv with the drawn parameters, the
     noise model's numbers and hashes, and dataset.json. Finished frames are kept: an interrupted
-    data set continues when it is started again. --seed seeds all draws.
+    data set continues when it is started again.
 
     \b
     Example:
