@@ -113,8 +113,8 @@ def emva_section(folder: Path, out: Path, picture: Path) -> Iterator[str]:
                 f" | {verdicts.count('differs')} | {verdicts.count('missed')} |"
             )
     yield ""
-    yield "*differ*: by more than chance, within the tolerance (2 % of means, 10 % of noise);"
-    yield "*missed*: by more than both.\n"
+    yield "*differ*: significant differences within the tolerance (2 % of means, 10 % of noise);"
+    yield "*missed*: significant differences beyond the tolerance.\n"
     far = [row for row in rows if row.verdict in ("differs", "missed")]
     cells = [
         f"| {r.frame} | {r.quantity} | {r.measured:.4g} | {r.predicted:.4g} | {r.error:+.3g} %"

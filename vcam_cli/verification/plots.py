@@ -42,7 +42,7 @@ def draw_errors(path: Path, result: Verification) -> None:
 
 
 def _draw_deviations(axes: Any, result: Verification) -> None:
-    """Draw how many quantities deviate by how many standard errors, and the bound of chance."""
+    """Draw how many quantities deviate by how many standard errors, and the significance limit."""
     rows = result.judged
     limit = max(row.bound or 0.0 for row in rows)
     ends = 1.25 * limit
@@ -54,7 +54,7 @@ def _draw_deviations(axes: Any, result: Verification) -> None:
     axes.set_ylabel("number of quantities")
     axes.yaxis.get_major_locator().set_params(integer=True)
     differing = sum(row.differs for row in rows)
-    axes.set_title(f"{len(rows)} quantities of frames, {differing} differ by more than chance")
+    axes.set_title(f"{len(rows)} quantities of frames, {differing} differ significantly")
 
 
 def _round_width(most: float, least: float) -> float:
