@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 import typer
 
 from vcam_cli.commands import options
+from vcam_cli.commands.progress import Progress
 
 DISTANCE = "18 in"
 
@@ -128,19 +129,21 @@ def compare(
     from vcam_cli import face
     from vcam_cli.files.report import to_json
 
-    found = face.compare(
-        image,
-        reference,
-        out,
-        ppd,
-        dpi,
-        distance,
-        space,
-        None if white is None else parse_white(white),
-        delta_e,
-        filters,
-        workers,
-    )
+    with Progress(quiet) as progress:
+        progress.begin("compare")
+        found = face.compare(
+            image,
+            reference,
+            out,
+            ppd,
+            dpi,
+            distance,
+            space,
+            None if white is None else parse_white(white),
+            delta_e,
+            filters,
+            workers,
+        )
     for note in found.notes:
         options.say(note, quiet)
     if as_json:

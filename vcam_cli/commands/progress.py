@@ -1,11 +1,11 @@
 """Progress on stderr: a bar on a terminal after two seconds; without one, a line a stage after ten.
 
-The bar stands at the share of the time that is over, and moves to and fro as long as nobody knows
-how much there will be. Lines of a sweep come once a minute, too.
+The bar shows the share of the time that is over, and moves back and forth while the total is
+unknown. Lines of a sweep come once a minute, too.
 
 The bar is drawn only on a terminal that takes it: NO_COLOR (https://no-color.org), a dumb terminal
 and --quiet are respected. The work goes on in the thread that began it; the display has a thread of
-its own, which loads the library that draws the bar when the two seconds are over, and not before.
+its own, which loads the library that draws the bar only then.
 """
 
 import contextlib
@@ -19,8 +19,9 @@ from typing import Any, Self
 from vcam_cli.interrupts import defer_interrupts
 from vcam_cli.progress import Timekeeper
 
-AFTER = 2.0
-"""Seconds before the bar appears."""
+AFTER = 1.8
+"""Seconds from the start of the program to the bar, which needs some 0.2 s to appear."""
+STARTED = time.monotonic()
 BAR_INTERVAL = 0.1
 """Seconds between two updates of the bar."""
 LOG_AFTER = 10.0
@@ -52,6 +53,8 @@ WORDS = {
     "frames": "computing frames",
     "figures": "computing figures",
     "tables": "writing tables",
+    "compare": "comparing images",
+    "report": "writing the report",
 }
 """Stage -> its description; that of others is their name."""
 
@@ -100,7 +103,7 @@ class Progress(Timekeeper):
         super().begin(stage)
 
     def _draw_bar(self) -> None:
-        if self._over.wait(AFTER):
+        if self._over.wait(max(STARTED + AFTER - time.monotonic(), 0.0)):
             return
         from rich.console import Console
         from rich.progress import BarColumn, TextColumn

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from vcam_cli.commands import options
+from vcam_cli.commands.progress import Progress
 
 OUT = Path("report.html")
 
@@ -36,13 +37,17 @@ def report(
     from vcam_cli.reports.side_by_side import read_runs, side_by_side
 
     if out.suffix.lower() not in (".html", ".htm"):
-        raise bad("--out", f"{out} is no name of a page", "write for example -o report.html")
+        raise bad(
+            "--out", f"{out} is not the name of an HTML page", "write for example -o report.html"
+        )
     try:
         if out.exists() and not page.is_report(out):
-            raise bad("--out", f"{out} is there and no report of vcam", "choose another name")
+            raise bad("--out", f"{out} exists and is not a report of vcam", "choose another name")
     except OSError as error:
         raise cannot_write(out, error) from error
-    page.write(out, side_by_side(read_runs(folders)))
+    with Progress(quiet) as progress:
+        progress.begin("report")
+        page.write(out, side_by_side(read_runs(folders)))
     adopt(out)
     if not quiet:
         print(out)
