@@ -18,8 +18,8 @@ Seed = Annotated[
         "--seed",
         metavar="N",
         min=0,
-        help="Seed of all draws: scenes, crops, parameters, frame seeds; the sensor's fixed pattern "
-        "stays.",
+        help="Seed of all draws: scenes, crops, parameters and frame seeds; the sensor's fixed "
+        "pattern stays.",
     ),
 ]
 

@@ -190,7 +190,7 @@ RULES = (
     Rule(
         ("display.dpi", "display.width", "display.viewing_distance", "display.filters"),
         _needs_no_viewer,
-        "no metric asks how large the picture is seen; add s-cielab to quality",
+        "no metric depends on the viewing conditions; add s-cielab to quality",
     ),
     Rule(
         ("output.steps",),
