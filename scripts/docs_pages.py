@@ -32,7 +32,7 @@ CACHE = ROOT / "build" / "gallery"
 WIDEST = 480
 """Columns of a photograph in the gallery, at most."""
 LARGE = 4_000_000
-"""Pixels of an array from which on a window of it takes the photograph, to save time."""
+"""Pixels of an array above which a window of it takes the photograph, to save time."""
 BOOST = {
     "reference/camera.md": 1.5,
     "reference/metrics.md": 1.5,
@@ -247,7 +247,12 @@ def _cite() -> str:
 
 def _of_repository(name: str) -> str:
     """Return a page of the repository with its links as seen from the documentation."""
-    return (ROOT / name).read_text("utf-8").replace("](docs/", "](")
+    return (
+        (ROOT / name)
+        .read_text("utf-8")
+        .replace("](docs/", "](")
+        .replace("](CHANGELOG.md)", "](changes.md)")
+    )
 
 
 # Gallery

@@ -1,7 +1,7 @@
 """Write the scenes of high dynamic range in configs/scenes: hdr-scene.png and dark-room.png.
 
 Run `.venv/bin/python scripts/make_hdr_scenes.py`. Both are drawn by the formulas below, 256 x 256,
-each pixel the mean of 8 x 8 samples; nobody photographed them. Codes are linear in light.
+each pixel the mean of 8 x 8 samples; they are no photographs. Codes are linear in light.
 
 hdr-scene: a room seen from within, 12 bits (codes 1 to 4095): a window, a lamp, a ColorChecker on
 the wall, a shelf in the dark. dark-room: an eye chart in the light of a bare bulb above it.

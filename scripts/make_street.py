@@ -1,7 +1,7 @@
 """Write the street in configs/scenes: houses behind a road, with a car on it, without, and it.
 
 Run `.venv/bin/python scripts/make_street.py`. They are drawn by the formulas below, each pixel the
-mean of 4 x 4 samples; nobody photographed them. Lengths are in meters, x to the right from the
+mean of 4 x 4 samples; they are no photographs. Lengths are in meters, x to the right from the
 middle, y up from the road; colors are sRGB codes from 0 to 1, of reflectances. The car by itself
 has a file of its opacity.
 """

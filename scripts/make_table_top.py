@@ -1,7 +1,7 @@
 """Write the pictures of the scene table-top in configs/scenes: a mug, fruit, and a shelf behind.
 
 Run `.venv/bin/python scripts/make_table_top.py`. They are drawn by the formulas below, each pixel
-the mean of 4 x 4 samples; nobody photographed them. Codes are linear in light; mug and fruit have
+the mean of 4 x 4 samples; they are no photographs. Codes are linear in light; mug and fruit have
 an alpha channel, which is their opacity.
 """
 

@@ -4,7 +4,7 @@ Run after a new release of colour-science: `.venv/bin/python scripts/make_tables
 ship in the wheel because importing colour-science takes a second; tests/test_tables.py holds them
 equal to it. Values are written so that they read back as the same floating-point numbers.
 
-The generic curves are formulas, written in each file's comment: nobody measured them.
+The generic curves are formulas, written in each file's comment: they are not measured.
 silicon-absorption.csv is not written here: its comment says where its numbers come from.
 """
 

@@ -1,7 +1,7 @@
 """Write configs/scenes/tunnel.exr: a road out of a tunnel, in cd/m2, seven decades of light.
 
 Run `.venv/bin/python scripts/make_tunnel.py`. It is drawn by the formulas below, 320 x 480, each
-pixel the mean of 4 x 4 samples; nobody photographed it. The luminances are round numbers of their
+pixel the mean of 4 x 4 samples; it is no photograph. The luminances are round numbers of their
 kind: a sunny landscape 3 000 to 8 000 cd/m2, a tunnel's wall 0.2 to 20, a dark car before the exit
 0.1, tail lights 2 000, lamps 20 000, headlamps seen in their beam 250 000.
 """

@@ -44,6 +44,15 @@ PHRASES = {
     r"\btaken? (?:to be|as 0)\b": "assumed to be; becomes 0",
     r"\bis said to\b|\bthere can be\b": "state it",
     r"\bwhat kind of\b": "kind of",
+    r"\b(?:than|by|of) chance\b(?! of)(?! that)": "significant; random",
+    r"\bfrom which on\b": "above which",
+    r"\bnobody\b": "unknown; not given; not measured",
+    r"\bthere is to (?:say|know|compare|see)\b": "name it",
+    r"\bas people say\b": "in words",
+    r"\bno name of\b|\bis there and no\b": "is not the name of; exists and is not",
+    r"\bto and fro\b": "back and forth",
+    r"\boff alike\b": "equal deviations",
+    r"\bis seen\b(?= how)|\basks how\b": "depends on",
 }
 """A phrase -> what to write in its place."""
 SKIP = "plain-words: skip"

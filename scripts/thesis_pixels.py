@@ -196,7 +196,7 @@ Curves = Callable[[str], tuple[np.ndarray, np.ndarray]]
 
 
 def _first_below(curves: Curves, case: str, other: str) -> float:
-    """Return the width from which on a case has less error than another [um]; nan for never."""
+    """Return the width above which a case has less error than another [um]; nan for never."""
     width, one = curves(case)
     _, two = curves(other)
     differs = one.mean(axis=0) - two.mean(axis=0)
@@ -209,12 +209,12 @@ def _first_below(curves: Curves, case: str, other: str) -> float:
 
 
 def tunnel_is_better_from(curves: Curves) -> float:
-    """Width from which on pictures with vignetting are the better ones [um]."""
+    """Width above which pictures with vignetting are the better ones [um]."""
     return _first_below(curves, "vignetting", "vignetting-bare")
 
 
 def microlens_is_worse_from(curves: Curves) -> float:
-    """Width from which on pictures with microlenses are the worse ones, 0.18 um [um]."""
+    """Width above which pictures with microlenses are the worse ones, 0.18 um [um]."""
     width, lens = curves("cmos-0.18um-microlens")
     _, bare = curves("cmos-0.18um")
     differs = lens.mean(axis=0) - bare.mean(axis=0)

@@ -59,7 +59,7 @@ class Timekeeper:
     def seconds_left(self, now: float) -> float | None:
         """Return the seconds left at a time of the clock; None where they are unknown or overdue.
 
-        Steps that are done say more than the time that was estimated.
+        Finished steps give a better estimate than the one from before the run.
         """
         done, total = self._steps
         if done:
@@ -106,7 +106,7 @@ class Calling(Timekeeper):
 
 
 def observer(watch: Observer | Callback | None) -> Observer:
-    """Return what follows a run: an observer, one that calls a function, or one for nobody.
+    """Return what follows a run: an observer, one that calls a function, or `Silent`.
 
     The function gets the name of the stage and the share of the time that is over, from 0 to 1, or
     None as long as nothing is known of it. The thread that works calls it, when a stage begins and

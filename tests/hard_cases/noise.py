@@ -18,7 +18,7 @@ RARE = 10.0 ** -np.arange(9, 17)
 
 
 def _chance(draws: object, means: np.ndarray) -> list[mp.mpf]:
-    """Chance that a mean gives an electron: of the normal numbers from which on it does."""
+    """Chance that a mean gives an electron: of the normal numbers above which it does."""
     low, high = np.zeros(means.size), np.full(means.size, 9.0)
     for _ in range(60):
         middle = (low + high) / 2

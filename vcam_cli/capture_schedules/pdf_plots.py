@@ -213,7 +213,7 @@ def _binned_outline(pdf: Pdf, low: float, wide: bool) -> tuple[Floats, Floats]:
 
     Bins of the display's own would hold now one level and now two, or none: a comb that is not in
     the light. So a bin ends where a neighborhood does, is as wide as the display can show, and
-    holds a share that is not that of chance gaps between levels.
+    holds a share that does not depend on random gaps between levels.
     """
     edges, share = _neighborhoods(pdf, low, wide)
     bins = _display_bins(edges, share, wide)

@@ -27,7 +27,7 @@ from vcam_cli.simulation.output import provenance
 SEGMENTS = ("segments", *SUMMARY[:5], "density")
 TARGETS = ("target", "captures", "gain", "upper_bound")
 NOTED_LOSS = 0.05
-"""Relative loss from which on a note is given."""
+"""Relative loss above which a note is given."""
 
 Writers = dict[str, Callable[[Path], None]]
 

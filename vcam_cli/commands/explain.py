@@ -57,7 +57,7 @@ def names() -> list[str]:
 
 
 def explanations(name: str) -> Iterator[dict[str, Any]]:
-    """Yield what there is to say of a name: title, about, and further lines by their headings."""
+    """Yield the explanation of a name: title, about, and further lines by their headings."""
     from vcam_cli.camera import hint_tables
 
     yield from _of_unit(name.strip())

@@ -212,7 +212,7 @@ Formats = Annotated[
     ),
 ]
 MOST_WORKERS_A_CORE = 4
-"""Threads or processes, from which on more only wait for each other."""
+"""Threads or processes, above which more only wait for each other."""
 
 
 def few_workers(asked: int | None) -> int | None:

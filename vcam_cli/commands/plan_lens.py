@@ -5,6 +5,7 @@ from functools import partial
 from pathlib import Path
 
 from vcam_cli.commands import options
+from vcam_cli.commands.progress import Progress
 
 
 def plan_lens(
@@ -25,10 +26,12 @@ def plan_lens(
     from vcam_cli.solve.solved import solve
 
     model = load(camera, overrides)
-    page = lens_page(solve(model))
     path = out or Path("out") / f"{model.name}-lens"
     place = OutputFolder(path, record="lens.json", inputs=provenance.inputs(model))
-    with place as folder:
+    with place as folder, Progress(quiet) as progress:
+        progress.begin("rays")
+        page = lens_page(solve(model))
+        progress.begin("files")
         write_table(folder.new("lens.csv"), columns(page), rows(page))
         drawn = {"lens.png": partial(plot_lens, page=page)}
         for name, draw in in_formats(drawn, formats or ()).items():

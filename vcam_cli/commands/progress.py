@@ -34,6 +34,7 @@ WORDS = {
     "read": "reading the image",
     "scene": "building the scene",
     "optics": "light through the lens",
+    "rays": "tracing rays",
     "exposure": "planning",
     "capture": "taking the frame",
     "flats": "taking flat fields",
@@ -164,7 +165,7 @@ class Progress(Timekeeper):
 
 
 def time_left_text(left: float | None) -> str:
-    """Return the time left [s] as people say it."""
+    """Return the time left [s] in words."""
     if left is None:
         return "a little longer"
     if left < 1.5:

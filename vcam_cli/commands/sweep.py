@@ -182,7 +182,7 @@ def results_table(means: "Sequence[Mapping[str, object]]") -> Table:
 
 
 def optimum_table(optima: "Sequence[CaseOptimum]") -> Table:
-    """Return the best value of each parameter in each case, with what there is to say of it."""
+    """Return the best value of each parameter in each case, with a remark."""
     from vcam_cli.sweeps.labeled_table import cell_text
 
     rows = []

@@ -2,7 +2,7 @@
 
 Mappings are merged key by key, anything else is replaced; an empty mapping under a key empties it.
 Keys laid over the name of a part change that part.
-`MergeRules` keep an override from meaning what nobody wrote.
+`MergeRules` keep an override from changing keys that it does not name.
 """
 
 from collections.abc import Mapping

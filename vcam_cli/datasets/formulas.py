@@ -25,7 +25,7 @@ from vcam_cli import units
 from vcam_cli.units import DIMENSIONS
 
 LONGEST, DEEPEST = 400, 20
-"""Characters and nested parentheses of a formula: nobody writes more, and reading them recurses."""
+"""Characters and nested parentheses of a formula, at most: its reader recurses."""
 DIGITS = 9
 """Digits of a value that is computed."""
 _UNITS = sorted(

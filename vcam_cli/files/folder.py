@@ -12,7 +12,7 @@ are unfinished and have no fingerprint: one that came from elsewhere has another
 
 Why flock: the kernel drops it when its holder dies, however it dies.
 
-Why an interrupt is deferred here: between two of these steps nobody would know what to undo. None
+Why an interrupt is deferred here: between two of these steps it is unknown what to undo. None
 of them takes long.
 """
 

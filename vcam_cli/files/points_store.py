@@ -47,7 +47,7 @@ _STARTING, _FINISHING, _SUMMARY = (1 << 61) + 1, (1 << 61) + 2, (1 << 61) + 3
 _LARGEST = 1 << 26
 """The most bytes that a point's own file can have."""
 _ABANDONED = 3600.0
-"""Seconds after which nobody writes a temporary file any more."""
+"""Seconds after which a temporary file is abandoned."""
 
 
 class SweepFolder:

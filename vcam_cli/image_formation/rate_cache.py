@@ -93,6 +93,6 @@ class RateCache:
 
 
 def _kept(rate: Rate) -> _CachedRate:
-    """Return light as it is kept: nobody who gets it may write into it."""
+    """Return light as it is kept: read-only."""
     rate.values.setflags(write=False)
     return _CachedRate(rate)

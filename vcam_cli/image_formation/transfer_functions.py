@@ -216,7 +216,7 @@ class Transfer:
 
     @cached_property
     def cutoff(self) -> float:
-        """Frequency from which on every H_kc is zero [cycles/m]; inf without such a frequency."""
+        """Frequency above which every H_kc is zero [cycles/m]; inf without such a frequency."""
         used = self.wavelengths[np.abs(self.weights).sum(axis=(0, 1)) > 0]
         if not len(used):
             return 0.0

@@ -41,7 +41,7 @@ class Reading:
     variance: Array | float
     """Of what is new in this reading, or of all of it where readings share no charge."""
     top: float
-    """Level from which on it saturates."""
+    """Level above which it saturates."""
     spread: float
     """Standard deviation at that level."""
 

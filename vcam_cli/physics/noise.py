@@ -26,7 +26,7 @@ from vcam_cli.arrays import Array
 CORNISH_FISHER_MEAN = 8.0
 """Mean from which the expansion is used [electrons]; below, the distribution is inverted."""
 FEW = 0.25
-"""Share of the numbers from which on those that are not inverted yet go on by themselves."""
+"""Share of the numbers above which those that are not inverted yet go on by themselves."""
 LEAST_TAIL = 1e-15
 """Probability of larger numbers below which they do not occur."""
 

@@ -97,7 +97,7 @@ class Context:
     linearize: Callable[[np.ndarray], np.ndarray] | None = None
     """Gives the codes of a linear ADC [DN] for those of this one; None where it is linear."""
     saturated_dn: float = np.inf
-    """Code from which on a pixel is saturated [DN]."""
+    """Code above which a pixel is saturated [DN]."""
     patches: Callable[[], Patches] | None = None
     """Gives the ColorChecker as this camera sees it; called only where a step needs it."""
     primaries: Callable[[], np.ndarray] | None = None

@@ -16,7 +16,7 @@ import numpy as np
 from vcam_cli.processing.base import Block
 
 KNEE = 0.95
-"""Share of saturation from which on a color is raised."""
+"""Share of saturation above which a color is raised."""
 
 
 @dataclass(frozen=True)

@@ -110,7 +110,7 @@ def encode(linear: np.ndarray, curve: Curve, bits: int) -> np.ndarray:
         return codes(linear, curve, bits)
     linear = np.ascontiguousarray(linear, dtype=np.float32)
     # Below 0 a float32 is a negative integer. Left to `take`, that takes four times as long where
-    # signs change by chance, as in dark frames.
+    # signs change at random, as in dark frames.
     inside = np.clip(linear.view(np.int32), 0, _ONE)
     index = np.right_shift(inside, table.shift, dtype=np.int32).astype(np.intp)
     code = table.code.take(index, mode="wrap")

@@ -2,7 +2,7 @@
 
 A mean describes a distribution that has one mode. How many a density has depends on how finely
 one looks: it is smoothed by a Gaussian, whose width is Silverman's rule of thumb, and its maxima
-are counted. The critical width is the least from which on there is a single one [1]; a
+are counted. The critical width is the least above which there is a single one [1]; a
 distribution is the more surely unimodal the less of its spread that is.
 
 References

@@ -42,7 +42,7 @@ class BracketExposure:
 
     @property
     def top(self) -> float:
-        """Photocurrent from which on it saturates [e/s]."""
+        """Photocurrent above which it saturates [e/s]."""
         return float(self.current(np.array([self.chain.saturated_dn - 0.5]))[0])
 
     def variances(self, currents: Array) -> Array:

@@ -63,7 +63,7 @@ class Merger(Protocol):
 
     @property
     def top(self) -> float:
-        """Merged signal from which on all readouts saturate [electrons]."""
+        """Merged signal above which all readouts saturate [electrons]."""
         ...
 
     def rounding(self, mean: float) -> float:

@@ -29,7 +29,7 @@ class MergedReadout:
     """Light of its photodiode over that of the large one."""
     photodiode: int
     top: float
-    """Signal from which on it saturates [e]."""
+    """Signal above which it saturates [e]."""
     own_variance: float
     """Of what is new in this readout, its rounding included [e^2]."""
     common_variance: float
@@ -65,7 +65,7 @@ class Merge:
 
     @property
     def top(self) -> float:
-        """Electrons of the large photodiode from which on all readouts saturate [e]."""
+        """Electrons of the large photodiode above which all readouts saturate [e]."""
         return self.readouts[0].top / self.readouts[0].sensitivity
 
     def electrons(self, dn: Sequence[Array], time: float) -> Array:

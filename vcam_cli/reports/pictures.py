@@ -17,7 +17,7 @@ from vcam_cli.quality import error_map
 from vcam_cli.reports.page import Picture, Scale
 
 WIDEST = 1024
-"""Columns of a picture from which on it is shown smaller: a page of six such has some 10 MB."""
+"""Columns of a picture above which it is shown smaller: a page of six such has some 10 MB."""
 SMALL = 320
 """Columns of a picture up to which a page shows it as large as it is, or larger."""
 

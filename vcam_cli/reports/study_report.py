@@ -16,7 +16,7 @@ REPORT = "report.html"
 MOST_ROWS = 400
 """Rows of a table that are shown; the file has them all."""
 FOLDED_ROWS = 24
-"""Rows from which on a table is folded at first."""
+"""Rows above which a table is folded at first."""
 
 
 def write(

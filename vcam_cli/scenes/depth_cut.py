@@ -34,7 +34,7 @@ BETWEEN = 0.73
 """Rms over all places between two layers of an error that is largest in the middle: of
 4 t (1 - t), sqrt(8 / 15)."""
 LEAST_JUMP = 0.1
-"""Difference of blur radii from which on one sample hides another [pixels]."""
+"""Difference of blur radii above which one sample hides another [pixels]."""
 STEPS = 24
 """Groups of radii, each searched at once for the background behind it."""
 EDGE = 1.0

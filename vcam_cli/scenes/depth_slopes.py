@@ -25,7 +25,7 @@ from vcam_cli.physics.aberration import paraboloid_transfer
 from vcam_cli.scenes.depth_detail import Detail, block_means
 
 STEEPEST = 1.0
-"""Difference of the radii of samples side by side from which on they are no slope under any
+"""Difference of the radii of samples side by side above which they are no slope under any
 other criterion: it would fold under the rays [samples]."""
 MOST_FINE = 16
 """Samples along a pixel's side into which samples are divided, at most."""

@@ -53,7 +53,7 @@ Bands are painted in units of white, and none in units of 0.
 ROWS = 64
 """Rows that are read at once."""
 FEW_POINTS = 8
-"""Samples per point from which on the bands of the points alone are read, and not the cube."""
+"""Samples per point above which the bands of the points alone are read, and not the cube."""
 
 
 @dataclass(frozen=True)

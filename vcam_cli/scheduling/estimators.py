@@ -117,7 +117,7 @@ def weighted_estimate(
     clean[0] = True
     estimate = last_sample_before_saturation(values, when, saturated, dark_rate)
     if read_variance == 0 and reset_variance == 0:
-        return estimate  # the last sample holds all there is to know
+        return estimate  # the last sample is a sufficient statistic
     for _ in range(PASSES):
         rate = np.maximum(estimate, 0) + dark_rate
         precision, signal = _precision_and_signal(

@@ -47,7 +47,7 @@ class ExposureSearch:
     percentile : float
         Percentile of the pixels by brightness that has to be measured.
     least_snr : float
-        Ratio of its signal to its noise from which on it is measured.
+        Ratio of its signal to its noise above which it is measured.
 
     Raises
     ------

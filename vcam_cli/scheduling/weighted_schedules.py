@@ -7,7 +7,7 @@ fewer captures; one capture at a time then moves to where the schedule is worth 
 result may be from the best is certified by an upper bound, as `gap`: that of `upper_bounds`, or
 for captures at whole frames the closer one of `flow_bound`.
 
-Without read and reset noise the last sample holds all there is to know, and `full_noise` applies.
+Without read and reset noise the last sample is a sufficient statistic, and `full_noise` applies.
 """
 
 from collections.abc import Iterator, Sequence

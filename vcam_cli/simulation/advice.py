@@ -13,7 +13,7 @@ from vcam_cli.image_formation.pixel_response import axis_levels
 from vcam_cli.simulation.preparation import Prepared
 
 INFRARED = 700e-9
-"""Wavelength from which on the eye sees next to nothing, and silicon much [m]."""
+"""Wavelength above which the eye sees next to nothing, and silicon much [m]."""
 VISIBLE_INFRARED = 0.1
 """Part of a color's signal of white that shifts colors so that it is worth a word."""
 DARK_WHITE = 0.5

@@ -102,7 +102,7 @@ class Frame(Prepared):
 
     @property
     def picture_saturated_dn(self) -> float:
-        """The value of `picture_dn` from which on a pixel is saturated in all its samples [DN]."""
+        """The value of `picture_dn` above which a pixel is saturated in all its samples [DN]."""
         if not self.times:
             return self.chain.saturated_dn
         charge = float(self.chain.to_electrons(np.array([self.chain.saturated_dn]))[0])

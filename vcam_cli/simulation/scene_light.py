@@ -42,7 +42,7 @@ from vcam_cli.solve.solved import Solved
 ASSUMED = 0.9
 """Full signal over the scene's brightest light, as assumed before there is any signal."""
 OVERFULL = 2.0
-"""Full wells of light from which on a pixel counts as full, if six standard deviations of its noise
+"""Full wells of light above which a pixel counts as full, if six standard deviations of its noise
 leave it so."""
 SAMPLES = 4
 """Samples of a chart over a pixel pitch where it is simulated as it is written, unless the camera

@@ -30,9 +30,9 @@ from vcam_cli.sweeps.optimum import (
 )
 
 MIN_POINTS = 3
-"""Number of values of a parameter from which on it is fitted."""
+"""Number of values of a parameter above which it is fitted."""
 MIN_BOOTSTRAP_CURVES = 16
-"""Number of curves from which on means are drawn from them: fewer spread the slopes of a fit less
+"""Number of curves above which means are drawn from them: fewer spread the slopes of a fit less
 than noise does, and its many points tell the noise."""
 REACHES = (2, 1)
 """Points on either side of the best that are fitted: at first, and where noise does not explain

@@ -36,7 +36,7 @@ SEED = 1
 CONFIDENCE = 0.95
 """Share of the drawn optima within low..high."""
 MIN_BOOTSTRAP_CURVES = 4
-"""Number of curves from which on means are drawn from them."""
+"""Number of curves above which means are drawn from them."""
 DEGREE = 3
 MIN_FIT_POINTS = 5
 """Number of points that are fitted at least: a cubic passes through fewer, whatever they say."""

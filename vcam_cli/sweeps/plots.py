@@ -18,11 +18,11 @@ from vcam_cli.sweeps.sweep_result import CaseOptimum
 SIZES = {1: (6.4, 4.2), 2: (9.6, 3.9), 3: (12.6, 3.7)}
 """Number of columns -> inches of one row."""
 WIDE_X, WIDE_Y = 20.0, 50.0
-"""Ratio of the largest to the smallest value from which on an axis is logarithmic."""
+"""Ratio of the largest to the smallest value above which an axis is logarithmic."""
 FLAT_Y = 4.0
 """The same ratio, up to which a linear axis does not begin at zero."""
 MANY = 10
-"""Entries from which on the legend stands beside the axes."""
+"""Entries above which the legend stands beside the axes."""
 
 
 @dataclass(frozen=True)

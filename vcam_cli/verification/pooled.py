@@ -1,7 +1,7 @@
 """Quantities of one kind pooled over frames and colors: many small differences of the same sign.
 
 A conversion gain that is 5 % off changes every temporal variance by 5 %, which may be within the
-chance of each. Their sum is not: deviations of n frames that are off alike add up to n, and by
+chance of each. Their sum is not: equal deviations of n frames add up to n, and by
 chance to about n^1/2. The predicted stacks give its distribution: each has its own sum, of
 its deviations from the others, including errors shared by frames of one sensor.
 """

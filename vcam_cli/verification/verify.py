@@ -112,8 +112,8 @@ class Verification:
     def summary(self) -> dict[str, float | int]:
         """Return numbers of the errors of means [%], and counts of rows.
 
-        These are all, those that miss a tolerance, those with a known distribution of chance, and
-        those that differ by more than that.
+        These are all, those that miss a tolerance, those with a known distribution, and those
+        that differ significantly.
         """
         percent = 100 * self.errors if self.errors.size else np.full(1, math.nan)
         return {

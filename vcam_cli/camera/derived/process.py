@@ -85,7 +85,7 @@ class Need:
 
 @dataclass(frozen=True)
 class Process:
-    """All numbers of a process [SI]; None where nobody gives one."""
+    """All numbers of a process [SI]; None where it is not given."""
 
     technology: bool
     """Whether the camera names a technology."""
@@ -106,7 +106,7 @@ class Process:
     def require(self, need: Need, *keys: str) -> list[float]:
         """Return the numbers [SI] of dotted keys of a technology.
 
-        Raises BadInput that names all that nobody gives, and where to write them.
+        Raises BadInput that names all that are not given, and where to write them.
         """
         values = [self._value(key) for key in keys]
         lacking = [key for key, value in zip(keys, values, strict=True) if value is None]

@@ -179,7 +179,7 @@ class Illuminant(YamlType):
         if isinstance(given, IlluminantSpec):
             return given
         if isinstance(given, str):
-            spectra.illuminant(given)  # ValueError for a name that nobody knows
+            spectra.illuminant(given)  # ValueError for an unknown name
             return IlluminantSpec(given)
         if isinstance(given, (list, tuple)) and given:
             alone = self.read(given[0])

@@ -29,7 +29,7 @@ class Smear(ColumnSpread):
     So it is where frames follow each other: what is clocked in for the next frame passes the same
     light. A frame-transfer ccd that moves its frame in the time t after an exposure of T has a =
     t / (T + t); of an interline ccd it is the share of light that meets the vertical register.
-    Light is caught by chance, so pixels stay Poisson and independent of each other.
+    Photons are absorbed at random, so pixels stay Poisson and independent of each other.
     """
 
     share: float

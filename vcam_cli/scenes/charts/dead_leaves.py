@@ -48,7 +48,7 @@ KEPT_CELLS = 1 << 22
 """Cells of a picture, parts counted, up to which their visible leaves are kept for other lenses. Of
 more, the last bands of a picture would drop its first."""
 SUMMED, SUMMED_FAR = 32, 4
-"""Parts along each side of a cell from which on its average is read from sums over one period, of
+"""Parts along each side of a cell above which its average is read from sums over one period, of
 cells within and beyond one. Their edges then fall between those of the parts: of white, an rms of
 6e-5 in single cells, and of 1e-3 in those beyond, which lenses blur by the hundred."""
 EDGE_SECONDS = 0.035, 0.0135

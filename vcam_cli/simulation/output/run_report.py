@@ -1,4 +1,4 @@
-"""report.html: what a run knows of itself, on one page.
+"""report.html: pictures, settings and results of a run on one page.
 
 Nothing is simulated for it: pictures are those of the frame, drawings follow from its plan and its
 effects, tables from the record that becomes `run.json`.
