@@ -19,14 +19,13 @@
 names find, and write what those write where `out` names a folder. `BadInput` and `CannotDo` are
 what all of them raise.
 
-Names are imported when they are first used, so that `import vcam_cli` costs a millisecond: that of
-listing its files, by which results know the code that made them.
+Names are imported when they are first used, so that `import vcam_cli` costs a millisecond.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from vcam_cli import source_code  # noqa: F401  first: before files change
+from vcam_cli import source_code  # noqa: F401  first: it notes the time
 
 __version__ = "1.0.0"
 _HOMES = {

@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -18,8 +19,13 @@ from vcam_cli.sweeps import computation, point_work
 
 pytestmark = pytest.mark.attack("results of other code")
 PACKAGE = Path(source_code.__file__).parent
-FOLDERS = sorted({name.rpartition("/")[0] for name, _, _ in source_code.LOADED})
+FOLDERS = sorted({name.rpartition("/")[0] for name, _ in source_code._files(PACKAGE, "")})
 OTHER_MSE = "\n\ndef mse(*args, **more):\n    return 777.0\n"
+
+
+def restart(monkeypatch) -> None:
+    """Let the package be loaded now."""
+    monkeypatch.setattr(source_code, "STARTED", time.time_ns())
 
 
 @pytest.fixture
@@ -28,7 +34,7 @@ def package(tmp_path, monkeypatch):
     copy = tmp_path / "vcam_cli"
     shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns(*source_code.NOT_CODE))
     monkeypatch.setattr(source_code, "PACKAGE", copy)
-    monkeypatch.setattr(source_code, "LOADED", source_code._state())
+    restart(monkeypatch)
     return copy
 
 
@@ -40,6 +46,14 @@ def same_size_and_time(path: Path) -> None:
     status, data = path.stat(), path.read_bytes()
     path.write_bytes(bytes([data[0] ^ 1]) + data[1:])
     os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
+
+
+def replaced_by_a_copy(path: Path) -> None:
+    """As by `cp -p`: of another file, with that file's time."""
+    other = path.with_name("other.txt")
+    other.write_bytes(path.read_bytes() + b"#")
+    os.utime(other, (0, 0))
+    other.replace(path)
 
 
 def renamed(path: Path) -> None:
@@ -78,15 +92,45 @@ def test_any_file_that_differs_is_other_code(package, monkeypatch, folder, chang
     if change is not same_size_and_time:
         with pytest.raises(CannotDo, match="own files have changed since it was started"):
             source_code.code_hash()
-    monkeypatch.setattr(source_code, "LOADED", source_code._state())
+    restart(monkeypatch)
     source_code._hash.cache_clear()
     assert source_code.code_hash() != first
+
+
+LATE = """
+import sys, vcam_cli.errors
+print("loaded", flush=True)
+sys.stdin.read()
+print(vcam_cli.source_code.code_hash())
+"""
+
+
+@pytest.mark.parametrize("change", [None, *CHANGES, replaced_by_a_copy])
+def test_changes_before_the_hash_is_first_needed(tmp_path, change):
+    """A process that was loaded from other files than those on the disk has no hash."""
+    copy = tmp_path / "vcam_cli"
+    copy.mkdir()
+    for name in ("__init__.py", "errors.py", "source_code.py"):
+        shutil.copy2(PACKAGE / name, copy)
+    env = os.environ | {"PYTHONPATH": str(tmp_path)}
+    line = [sys.executable, "-c", LATE]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen(line, cwd=tmp_path, env=env, text=True, **pipes) as process:
+        assert process.stdout.readline() == "loaded\n"
+        if change:
+            change(copy / "errors.py")
+        out, error = process.communicate()
+    if change:
+        assert "own files have changed since it was started" in error
+        assert not out
+    else:
+        assert len(out.strip()) == 16
 
 
 def test_bytes_that_move_from_file_to_file(package, monkeypatch):
     first = source_code.code_hash()
     moved_over_the_border(package / "errors.py")
-    monkeypatch.setattr(source_code, "LOADED", source_code._state())
+    restart(monkeypatch)
     assert source_code.code_hash() != first
 
 
@@ -98,7 +142,7 @@ def test_the_same_files_elsewhere_are_the_same_code(package, monkeypatch):
     (package / "configs" / "a.csv").touch()
     for path in package.rglob("*.py"):
         os.utime(path, (0, 0))
-    monkeypatch.setattr(source_code, "LOADED", source_code._state())
+    restart(monkeypatch)
     copied = source_code.code_hash()
     monkeypatch.undo()
     assert copied == source_code.code_hash()
