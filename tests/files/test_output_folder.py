@@ -7,12 +7,14 @@ import signal
 import subprocess
 import sys
 import textwrap
+import time
 from pathlib import Path
 
 import pytest
 
 from vcam_cli.errors import BadInput, CannotDo
 from vcam_cli.files import folder as folder_module
+from vcam_cli.files import records
 from vcam_cli.files.atomic import STAGING, write_text
 from vcam_cli.files.folder import LOCK, OutputFolder
 
@@ -260,3 +262,23 @@ def test_file_system_without_locks_is_used_all_the_same(tmp_path, monkeypatch):
     monkeypatch.setattr(folder_module.fcntl, "flock", refuse)
     run(tmp_path / "out", {"raw.exr": "1"})
     assert tree(tmp_path / "out") == ["raw.exr", "run.json"]
+
+
+def test_a_file_that_was_written_is_read_again_when_it_changes(tmp_path):
+    """Its hash is remembered by size, times and number: a planted one of the same size is found."""
+    path, temporary = tmp_path / "shard.npz", tmp_path / "temporary"
+    temporary.write_bytes(b"a" * 100)
+    before, made = temporary.lstat(), records.file_fingerprint(temporary)
+    temporary.rename(path)
+    records.remember(path, before, made)
+
+    def holds():
+        return records.Proofs(tmp_path, {"files": [path.name], "written": {path.name: made}}).holds(
+            path.name
+        )
+
+    assert holds()
+    time.sleep(0.02)  # clocks of file systems tick every few milliseconds
+    path.write_bytes(b"b" * 100)
+    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+    assert not holds()

@@ -9,10 +9,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, overload
+from threading import Lock
+from typing import Any, Self, overload
 
 from vcam_cli.datasets import manifest
 from vcam_cli.datasets.dataset_file import DatasetFile
@@ -81,17 +84,19 @@ def dataset(
     versions = {name: found for name, found in provenance.versions().items() if name in LIBRARIES}
     whole = cut(file, Hasher(file, execution.device))
     mine = _of_share(whole, execution)
-    with SweepFolder(out, RECORD) as folder:
+    with SweepFolder(out, RECORD) as folder, ExitStack() as opened:
         asked = hash_text(to_json([shard.ids for shard in whole]))
         former = folder.begin({"name": file.model.name}, asked)
         packer = Packer(folder, file.model.format, _scale(file), former)
-        parts = _Parts(folder, packer, whole, execution.fresh, versions["code"])
+        packing = opened.enter_context(_Packing(folder))
+        parts = _Parts(folder, packer, packing, whole, execution.fresh, versions["code"])
         left = [shard for shard in mine if not parts.is_packed(shard)]
         groups = [g for shard in left for g in _groups(file, shard, versions, execution.device)]
         sizes = {part.id: len(part.numbers) for shard in left for part in shard.parts}
         if execution.device != "cpu" and batch_key(file.frame(0), file.model.write) is None:
             tell("frames take their light from the processor, one by one")
         computed = compute(groups, parts, execution, watch, tell, "frames", sizes)
+        packing.wait()
         with folder.summarizing():
             packed = [(shard, parts.pack(shard)) for shard in whole]
             found = [shard for shard, files in packed if files is not None]
@@ -130,13 +135,67 @@ def _of_share(whole: list[Shard], execution: Execution) -> list[Shard]:
     return whole[share.number - 1 :: share.count]
 
 
+PACKERS = 4
+"""Threads that pack shards beside the computation: they hash, copy and wait for the disk."""
+
+
+class _Packing:
+    """Shards that threads pack, while no other process makes tables or shards of the folder."""
+
+    def __init__(self, folder: SweepFolder) -> None:
+        self._folder, self._lock, self._count = folder, Lock(), 0
+        self._alone = ExitStack()
+        self._pool = ThreadPoolExecutor(PACKERS)
+        self._waiting: list[Future[None]] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._pool.shutdown(cancel_futures=True)
+
+    def add(self, pack: Callable[[], object]) -> None:
+        """Have a shard packed. Raise what went wrong with those before."""
+        self.wait(is_done=True)
+        while len(self._waiting) >= 2 * PACKERS:  # the disk holds the parts of no more
+            self._waiting.pop(0).result()
+        self._waiting.append(self._pool.submit(self._pack, pack))
+
+    def wait(self, is_done: bool = False) -> None:
+        """Wait for all shards, or look at those that are done. Raise what went wrong."""
+        for future in list(self._waiting):
+            if future.done() or not is_done:
+                self._waiting.remove(future)
+                future.result()
+
+    def _pack(self, pack: Callable[[], object]) -> None:
+        with self._lock:  # locks of files are those of the process, not of a thread
+            if not self._count:
+                self._alone.enter_context(self._folder.summarizing())
+            self._count += 1
+        try:
+            pack()
+        finally:
+            with self._lock:
+                self._count -= 1
+                if not self._count:
+                    self._alone.close()
+
+
 class _Parts:
     """The parts to compute, and their records; shards are packed when theirs are there."""
 
     def __init__(
-        self, folder: SweepFolder, packer: Packer, shards: Sequence[Shard], fresh: bool, code: str
+        self,
+        folder: SweepFolder,
+        packer: Packer,
+        packing: _Packing,
+        shards: Sequence[Shard],
+        fresh: bool,
+        code: str,
     ) -> None:
         self._folder, self._packer, self._fresh, self._code = folder, packer, fresh, code
+        self._packing = packing
         self._shards = {part.id: shard for shard in shards for part in shard.parts}
         self._left = {shard.number: {part.id for part in shard.parts} for shard in shards}
         """Number of a shard -> its parts that are not known to be there."""
@@ -178,8 +237,7 @@ class _Parts:
         shard = self._shards[part]
         self._left[shard.number].discard(part)
         if not self._left[shard.number]:
-            with self._folder.summarizing():
-                self.pack(shard)
+            self._packing.add(partial(self.pack, shard))
 
     def _is_finished(self, part: str) -> bool:
         """Return whether a part is kept, or in a shard that another process has packed."""

@@ -23,7 +23,7 @@ from vcam_cli.files import frame_archive
 from vcam_cli.files.atomic import write_whole
 from vcam_cli.files.images import tiff
 from vcam_cli.files.points_store import SweepFolder
-from vcam_cli.files.records import Fingerprint, Proofs, file_fingerprint
+from vcam_cli.files.records import Fingerprint, Proofs, file_fingerprint, remember
 from vcam_cli.files.report import hash_text, to_json
 
 Stored = tuple[frame_archive.Archive, str, str, str]
@@ -152,13 +152,14 @@ class Packer:
         path = self.folder.path / name
         with write_whole(path) as temporary:
             write(temporary)
-            made = file_fingerprint(temporary)
+            before, made = temporary.lstat(), file_fingerprint(temporary)
             proofs = Proofs(
                 self.folder.path, self.former, {"files": [name], "written": {name: made}}
             )
             if os.path.lexists(path) and not proofs.holds(name):
                 message = f"{path} is there already and was not written by vcam, or changed since"
                 raise bad("--out", message, "move it away, or choose another folder")
+        remember(path, before, made)
         return made
 
 

@@ -74,13 +74,49 @@ def file_fingerprint(path: Path) -> Fingerprint:
         return {"bytes": os.fstat(file.fileno()).st_size, "sha256": digest}
 
 
+_FINGERPRINTS: dict[tuple[int, ...], Fingerprint] = {}
+"""State of a file -> its fingerprint, of files that this process has read or written last."""
+_REMEMBERED = 4096
+
+
+def _state(status: os.stat_result) -> tuple[int, ...]:
+    """Return numbers of a file, of which one changes whenever its content does."""
+    times = status.st_mtime_ns, status.st_ctime_ns
+    return status.st_dev, status.st_ino, status.st_size, *times
+
+
+def _remember(state: tuple[int, ...], made: Fingerprint) -> None:
+    while len(_FINGERPRINTS) >= _REMEMBERED:
+        _FINGERPRINTS.pop(next(iter(_FINGERPRINTS)), None)
+    _FINGERPRINTS[state] = made
+
+
+def remember(path: Path, before: os.stat_result, made: Fingerprint) -> None:
+    """Remember the fingerprint of a file that was hashed before it got its name.
+
+    To read a shard again takes longer than to compute it. A rename keeps content, size and time of
+    the last change; a file of another size or time is read when it is needed.
+
+    Parameters
+    ----------
+    path : Path
+        The file under its name.
+    before : os.stat_result
+        Its state when it was hashed, under its temporary name.
+    made : Fingerprint
+        Its fingerprint.
+    """
+    after = path.lstat()
+    if _state(before)[:4] == _state(after)[:4]:
+        _remember(_state(after), made)
+
+
 class Proofs:
     """What records say of the files of a folder: which of them are vcam's."""
 
     def __init__(self, folder: Path, *records: Mapping[str, Any] | None) -> None:
         self._folder = folder
         self._known: dict[str, list[Fingerprint]] = {}
-        self._read: dict[tuple[Any, ...], Fingerprint] = {}
         for record in filter(None, records):
             for name in record["files"]:
                 self._known.setdefault(name, [])
@@ -116,10 +152,12 @@ class Proofs:
                 return False
             if not any(isinstance(k, dict) and k.get("bytes") == status.st_size for k in known):
                 return False
-            state = name, status.st_size, status.st_mtime_ns, status.st_ctime_ns, status.st_ino
-            if state not in self._read:
-                self._read[state] = file_fingerprint(path)
-            return self._read[state] in known
+            state = _state(status)
+            found = _FINGERPRINTS.get(state)
+            if found is None:
+                found = file_fingerprint(path)
+                _remember(state, found)
+            return found in known
         except OSError:
             return False
 
