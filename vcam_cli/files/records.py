@@ -80,7 +80,7 @@ _REMEMBERED = 4096
 
 
 def _state(status: os.stat_result) -> tuple[int, ...]:
-    """Return numbers of a file, of which one changes whenever its content does."""
+    """Return numbers of a file; one changes whenever its content does."""
     times = status.st_mtime_ns, status.st_ctime_ns
     return status.st_dev, status.st_ino, status.st_size, *times
 
