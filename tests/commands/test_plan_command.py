@@ -30,6 +30,18 @@ def test_json_has_the_keys_of_the_contract():
     assert report["memory_bytes"] > 0
 
 
+def test_a_graphics_processor_saves_noise_and_readout_and_takes_its_start():
+    """Twelve times the pixels: further frames cost less there, a first one more."""
+    large = ["--set", "array.rows=600", "--set", "array.columns=800", "--json"]
+    here, there = json.loads(plan(*large)), json.loads(plan(*large, "--device", "gpu"))
+    assert set(there) - set(here) == {"device_seconds", "device_start"}
+    further = there["device_seconds"] - there["device_start"]
+    assert 0 < further < there["seconds"] < there["device_seconds"]
+    assert re.search(
+        r"with --device gpu [\d.e-]+ s, then [\d.e-]+ s a frame", plan("--device", "gpu")
+    )
+
+
 @pytest.mark.long
 def test_the_run_does_what_the_plan_says(tmp_path):
     told = json.loads(plan("--json"))

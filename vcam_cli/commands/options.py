@@ -240,13 +240,18 @@ Workers = Annotated[
 ]
 
 
-def _device(name: str) -> str:
-    """Refuse another name than those of devices, and a device that is not there."""
-    if name != "cpu":
-        from vcam_cli.devices.choice import DEVICES, open_device
+def device_name(name: str) -> str:
+    """Return the name of a device; refuse another name."""
+    if name not in ("cpu", "gpu"):
+        raise typer.BadParameter(f"{name!r} is no device; write cpu or gpu")
+    return name
 
-        if name not in DEVICES:
-            raise typer.BadParameter(f"{name!r} is no device; write cpu or gpu")
+
+def _device(name: str) -> str:
+    """Return the name of a device that is there."""
+    if device_name(name) != "cpu":
+        from vcam_cli.devices.choice import open_device
+
         open_device(name)
     return name
 

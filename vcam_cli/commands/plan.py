@@ -51,6 +51,16 @@ LensPage = Annotated[
         " illumination, color. Writes lens.png and lens.csv.",
     ),
 ]
+PlannedDevice = Annotated[
+    str,
+    typer.Option(
+        "--device",
+        metavar="cpu|gpu",
+        callback=options.device_name,
+        help="gpu: also estimate the time with noise and readout on a graphics processor (an"
+        " H100); none has to be there.",
+    ),
+]
 Details = Annotated[
     bool,
     typer.Option(
@@ -74,6 +84,7 @@ def plan(
     lens: LensPage = False,
     details: Details = False,
     formats: options.Formats = None,
+    device: PlannedDevice = "cpu",
 ) -> None:
     """Show the effects that a run simulates or skips, with reasons, and its time and memory.
 
@@ -129,6 +140,8 @@ def plan(
         rate_of_frames = (
             f"{found.frames_per_second:.4g} frames/s, {most:.4g} at most: {found.readout.reason}"
         )
+    if device != "cpu":
+        report["device_seconds"], report["device_start"] = found.device_seconds()
     if as_json:
         print(to_json(report), end="")
     elif geometry:
@@ -198,5 +211,13 @@ def facts(
         *([("crosstalk", mixing(report["color_mixing"]))] if "color_mixing" in report else []),
         *([("readout", frame_rate)] if frame_rate else []),
         ("accuracy", f"rms error within {100 * report['settings']['tolerance']:.3g} % of signal"),
-        ("cost", f"about {seconds:.2g} s and {memory:.0f} MB"),
+        ("cost", f"about {seconds:.2g} s and {memory:.0f} MB{_on_device(report)}"),
     ]
+
+
+def _on_device(report: dict[str, Any]) -> str:
+    """Return what the frame costs on a graphics processor, where that was asked."""
+    if "device_seconds" not in report:
+        return ""
+    first, start = report["device_seconds"], report["device_start"]
+    return f"; with --device gpu {first:.2g} s, then {first - start:.2g} s a frame"

@@ -8,9 +8,10 @@ from typing import Any
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.frame_rate import FrameRate
 from vcam_cli.progress import Observer
+from vcam_cli.simulation import cost_model
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.remarks import Notes
-from vcam_cli.simulation.simulate import prepare
+from vcam_cli.simulation.simulate import prepare, threads
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,8 @@ class PlannedRun:
     """What to know of it, a sentence each."""
     readout: FrameRate | None
     """How fast it takes frames; None where the file does not say."""
+    workers: int = 1
+    """Threads of the run."""
 
     @property
     def effects(self) -> list[dict[str, Any]]:
@@ -63,6 +66,10 @@ class PlannedRun:
             for color, row in zip(colors, sharing.matrix, strict=True)
         }
 
+    def device_seconds(self) -> tuple[float, float]:
+        """Return the seconds with a graphics processor: a first frame, and what only that takes."""
+        return cost_model.device_seconds(self.ready.solved, self.ready.plan, self.workers)
+
     def __repr__(self) -> str:
         """Return a line: name, effects that run, seconds and memory expected."""
         plan, name = self.ready.plan.report(), self.ready.solved.name
@@ -96,4 +103,4 @@ def planned_run(camera: Camera, workers: int | None, watch: Observer) -> Planned
         Where memory does not suffice.
     """
     ready, notes = prepare(camera, workers, watch)
-    return PlannedRun(ready, notes, ready.solved.frame_rate)
+    return PlannedRun(ready, notes, ready.solved.frame_rate, workers or threads(camera))
