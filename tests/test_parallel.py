@@ -83,6 +83,15 @@ def test_a_run_with_one_thread_to_start(tmp_path, thread_limit):
     assert (tmp_path / "out" / "raw.exr").exists()
 
 
+@pytest.mark.parametrize("count", [1, 2, 31, 97, 1000])
+@pytest.mark.parametrize("workers", [1, 2, 3])
+def test_results_stay_in_order_however_many_there_are(count, workers):
+    """And the first error is raised, whichever thread meets it first."""
+    assert parallel.results(lambda i: i * i, range(count), workers) == [i * i for i in range(count)]
+    with pytest.raises(KeyError, match=f"^{count // 2}$"):
+        parallel.each(lambda i: {}[i] if i >= count // 2 else i, range(count), workers)
+
+
 def test_threads_are_started_in_one_module_alone():
     """So that what holds of them there holds of all."""
     package = Path(vcam_cli.__file__).parent

@@ -37,9 +37,8 @@ def test_a_graphics_processor_saves_noise_and_readout_and_takes_its_start():
     assert set(there) - set(here) == {"device_seconds", "device_start"}
     further = there["device_seconds"] - there["device_start"]
     assert 0 < further < there["seconds"] < there["device_seconds"]
-    assert re.search(
-        r"with --device gpu [\d.e-]+ s, then [\d.e-]+ s a frame", plan("--device", "gpu")
-    )
+    said = r"with --device gpu [\d.e-]+ s, then [\d.e-]+ s a frame"
+    assert re.search(said, plan("--device", "gpu"))
 
 
 @pytest.mark.long

@@ -16,7 +16,7 @@ import scipy.fft
 from vcam_cli.arrays import Array
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.scene_spectrum import Index, SceneSpectrum, pairs
-from vcam_cli.parallel import product
+from vcam_cli.parallel import AT_ONCE, product, slices_within
 from vcam_cli.scenes.base import ChartScene
 from vcam_cli.scenes.cells import cell_edges
 from vcam_cli.scenes.closed_form import LightDisc, Rectangles
@@ -393,10 +393,13 @@ def terms_of_runs(edges: Array, cells: int, terms: int) -> Array:
         Coefficients (terms, runs).
     """
     parts = (edges - edges[0]) / (edges[-1] - edges[0])
-    k = np.arange(1, terms)
-    sines = np.sin(np.pi * (np.outer(k, parts) % 2))
     out = np.empty((terms, len(parts) - 1))
     out[0] = 2 * cells * np.diff(parts)
-    scale = 2 * cells * np.sinc(k / (2 * cells)) / (np.pi * k)
-    out[1:] = np.diff(sines, axis=1) * scale[:, None]
+    for some in slices_within(slice(1, terms), max(1, AT_ONCE // len(parts))):
+        k = np.arange(some.start, some.stop)
+        turns = np.outer(k, parts)
+        turns -= 2 * np.floor(turns / 2)  # exact, and 5 times as fast as % 2
+        sines = np.sin(np.pi * turns)
+        scale = 2 * cells * np.sinc(k / (2 * cells)) / (np.pi * k)
+        np.multiply(np.diff(sines, axis=1), scale[:, None], out=out[some])
     return out

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.sensor.array import Block
@@ -31,7 +32,7 @@ class Mosaic:
 
     block: tuple[tuple[str, ...], ...]
 
-    @property
+    @cached_property
     def colors(self) -> tuple[str, ...]:
         """Colors in the order of channels: R, G, B first, others by first appearance."""
         return channel_order(c for row in self.block for c in row if c != NONE)
