@@ -98,13 +98,13 @@ def each(work: Callable[[Item], object], items: Iterable[Item], workers: int) ->
 
 def results(work: Callable[[Item], Result], items: Iterable[Item], workers: int) -> list[Result]:
     """Return what `work` makes of every item; raise the first exception that it raises."""
-    items = list(items)
-    if workers > 1 and len(items) > 1:
-        runs = pieces(len(items), -(-len(items) // (workers * RUNS)))
+    every = list(items)
+    if workers > 1 and len(every) > 1:
+        runs = pieces(len(every), -(-len(every) // (workers * RUNS)))
         with suppress(NoThread), ThreadPool(min(workers, len(runs))) as pool:
-            found = pool.map(lambda run: [work(item) for item in items[run]], runs)
+            found = pool.map(lambda run: [work(item) for item in every[run]], runs)
             return list(chain.from_iterable(found))
-    return [work(item) for item in items]
+    return [work(item) for item in every]
 
 
 def rows_at_once(values: int) -> int:
@@ -125,9 +125,12 @@ def slices_within(whole: slice, size: int) -> list[slice]:
     return [slice(i, min(i + size, whole.stop)) for i in range(whole.start, whole.stop, size)]
 
 
-def product(left: Array, right: Array) -> Array:
-    """Return the product of two matrices of the same float type, computed in one thread."""
-    out = np.empty((len(left), right.shape[1]), right.dtype)
+def product(left: Array, right: Array, dtype: type | None = None) -> Array:
+    """Return the product of two matrices of the same float type, computed in one thread.
+
+    It is computed in their float type, and rounded to `dtype` where that is another.
+    """
+    out = np.empty((len(left), right.shape[1]), dtype or right.dtype)
     if left.size > PRODUCT >= right.size:
         for rows in pieces(len(out), max(1, PRODUCT // max(1, right.size))):
             np.matmul(left[rows], right, out=out[rows])

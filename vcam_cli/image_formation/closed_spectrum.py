@@ -326,12 +326,13 @@ class ProductSpectrum:
             Sums (pairs, len(y) - 1, len(x) - 1), in the order of `scene_spectrum.pairs`.
         """
         planes, runs, columns = self.along_x.shape
-        below = self.along_y.astype(np.float64)
-        in_rows = np.array([below[s].T @ below[s] for s in _blocks(y)]).reshape(-1, runs**2)
+        below = (self.along_y[s].astype(np.float64) for s in _blocks(y))
+        in_rows = np.array([block.T @ block for block in below]).reshape(-1, runs**2)
         out = []
         for plane in range(planes):
-            others = self.along_x[plane:].reshape(-1, columns).astype(np.float64)
-            in_columns = np.array([others[:runs, s] @ others[:, s].T for s in _blocks(x)])
+            others = self.along_x[plane:].reshape(-1, columns)
+            beside = (others[:, s].astype(np.float64) for s in _blocks(x))
+            in_columns = np.array([block[:runs] @ block.T for block in beside])
             for other in np.split(in_columns, planes - plane, axis=2):
                 out.append(product(in_rows, other.reshape(-1, runs**2).T))
         return np.array(out)
@@ -367,8 +368,8 @@ def rectangle_spectrum(
     along_y = terms_of_runs(rectangles.y, cells[0], axes[0].terms)
     along_x = terms_of_runs(rectangles.x, cells[1], axes[1].terms)
     values = rectangles.values.reshape(-1, along_x.shape[1])  # one product: NumPy's of each is slow
-    in_rows = product(values, along_x.T).reshape(*rectangles.values.shape[:2], -1)
-    return ProductSpectrum(along_y.astype(dtype), in_rows.astype(dtype))
+    in_rows = product(values, along_x.T, dtype).reshape(*rectangles.values.shape[:2], -1)
+    return ProductSpectrum(along_y.astype(dtype), in_rows)
 
 
 def terms_of_runs(edges: Array, cells: int, terms: int) -> Array:
