@@ -10,7 +10,6 @@ import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
-from itertools import chain
 from typing import ParamSpec, TypeVar
 
 import numpy as np
@@ -99,12 +98,15 @@ def each(work: Callable[[Item], object], items: Iterable[Item], workers: int) ->
 def results(work: Callable[[Item], Result], items: Iterable[Item], workers: int) -> list[Result]:
     """Return what `work` makes of every item; raise the first exception that it raises."""
     every = list(items)
+
+    def run(places: slice) -> list[Result]:
+        return [work(item) for item in every[places]]
+
     if workers > 1 and len(every) > 1:
         runs = pieces(len(every), -(-len(every) // (workers * RUNS)))
         with suppress(NoThread), ThreadPool(min(workers, len(runs))) as pool:
-            found = pool.map(lambda run: [work(item) for item in every[run]], runs)
-            return list(chain.from_iterable(found))
-    return [work(item) for item in every]
+            return [result for some in pool.map(run, runs) for result in some]
+    return run(slice(None))
 
 
 def rows_at_once(values: int) -> int:
