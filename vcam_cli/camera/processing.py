@@ -15,6 +15,7 @@ from vcam_cli.camera.processing_steps import (
     GamutMapping,
     Jpeg,
     LensDistortion,
+    LensShading,
     Matrix,
     Remosaic,
     Sharpen,
@@ -42,6 +43,7 @@ _ANY = (
     | Denoise
     | Sharpen
     | GamutMapping
+    | LensShading
     | LensDistortion
     | Tone
     | Gamma
@@ -109,6 +111,12 @@ def _plugin(name: Any, given: Any) -> type[PluginStep]:
 
 OF_COLORS = ("white_balance", "color_correction", "gamut_mapping")
 """Steps that change colors; a monochrome array has no colors."""
+GAINS = ("lens_shading", "white_balance", "color_correction")
+"""Steps that multiply light, which needs black at zero."""
+SCATTERED = (
+    "the falloff of scattered pixels is undone on the picture's grid",
+    "add demosaic: bilinear to processing",
+)
 STEP_LIST = Either(_steps, list[_ANY])
 """The type of `processing`."""
 
@@ -155,6 +163,8 @@ def order_mistakes(
         if scattered and step.value == "edge-aware":
             message = "edge-aware needs pixels in rows and columns"
             yield fault(("processing", i, name), message, "write bilinear", to_yaml(step))
+        if scattered and step.name == "lens_shading" and "demosaic" not in names:
+            yield fault(("processing", i, name), *SCATTERED, to_yaml(step))
         if isinstance(step.value, Matrix) and colors and not step.value.suits(colors):
             message = f"is no matrix for {colors} colors"
             remedy = f"write three rows (display R, G, B) of {colors} numbers (the camera's colors)"
@@ -203,6 +213,10 @@ def code_mistakes(steps: Sequence[Step], render: int | None) -> Iterator[InitErr
             yield fault(path, message, "write output: {render: 8}", to_yaml(step))
 
 
+_ELSEWHERE = ("color_correction", "gamut_mapping", "lens_distortion")
+"""Steps behind which values are no longer those of the sensor's colors and places."""
+
+
 def stage_mistakes(step: Any, before: Sequence[Any]) -> Iterator[tuple[str, str]]:
     """Yield why a step cannot follow others: it comes twice, or they left no linear light.
 
@@ -228,6 +242,11 @@ def stage_mistakes(step: Any, before: Sequence[Any]) -> Iterator[tuple[str, str]
         yield f"{name} after {late[0]}, which takes the render's codes", f"put {late[0]} last"
     elif "gamma" in names:
         yield f"{name} after gamma: the steps work on linear light", "put gamma last"
+    elif name == "lens_shading" and (earlier := [n for n in _ELSEWHERE if n in names]):
+        yield (
+            f"{name} after {earlier[0]}: it is by place and color of the sensor",
+            f"put {name} first",
+        )
     elif "tone" in names and name != "gamma":
         yield f"{name} after tone: the steps work on the light of the scene", f"put {name} first"
 
@@ -243,7 +262,7 @@ def _reasons(
     if step.value == "none":
         return
     name = step.name
-    late = [step for step in ("white_balance", "color_correction") if step in before]
+    late = [step for step in GAINS if step in before]
     if name == "black_level" and late:
         yield f"black_level after {late[0]}: gains need black at zero", "put black_level first"
     if name == "remosaic" and "demosaic" in before:

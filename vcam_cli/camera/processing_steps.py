@@ -194,6 +194,16 @@ class GamutMapping(Step):
     )
 
 
+class LensShading(Step):
+    """Correction of the light that falls off toward the corners, by color."""
+
+    lens_shading: Literal["correct", "none"] = key(
+        "correct: multiplies each color by the inverse of optics.off_axis, and of what pixels keep"
+        " of slanted light; behind black_level",
+        example="correct",
+    )
+
+
 class LensDistortion(Step):
     """Correction of the distortion of optics.distortion and projection."""
 

@@ -52,6 +52,13 @@ class Correction(Protocol):
         """Return rows and columns in the distorted picture of rows of the corrected one."""
 
 
+class Shading(Protocol):
+    """What makes even light even that falls off toward the corners."""
+
+    def correction(self, color: str, rows: np.ndarray, columns: slice) -> np.ndarray:
+        """Return the factors of a color at some rows and columns of the picture (M, N)."""
+
+
 class Layout(Protocol):
     """Positions of pixels that fill no rows and columns of squares.
 
@@ -115,6 +122,8 @@ class Context:
     correction: Correction | None = None
     """Where a picture without its lens's distortion takes its pixels from; None where the lens has
     none."""
+    shading: Shading | None = None
+    """How the light of each color falls off; None where it does not."""
 
     @property
     def mosaic(self) -> bool:

@@ -5,7 +5,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from vcam_cli.camera.processing import OF_COLORS, acts_on, stage_mistakes
+from vcam_cli.camera.processing import GAINS, OF_COLORS, SCATTERED, acts_on, stage_mistakes
 from vcam_cli.camera.step_plugins import PluginStep
 from vcam_cli.errors import Collector, nearest
 from vcam_cli.processing.base import Pattern
@@ -19,6 +19,7 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "denoise": (),
     "sharpen": (),
     "gamut_mapping": ("desaturate", "none"),
+    "lens_shading": ("correct", "none"),
     "lens_distortion": ("correct", "none"),
     "tone": (),
     "gamma": ("srgb",),
@@ -91,13 +92,15 @@ def check(
         before = names[:index]
         for message, remedy in stage_mistakes(step, steps[:index]):
             found.add(path, message, remedy)
-        late = [name for name in ("white_balance", "color_correction") if name in before]
+        late = [name for name in GAINS if name in before]
         if step.name == "black_level" and late:
             found.add(
                 path,
                 f"black_level after {late[0]}: gains need black at zero",
                 f"put black_level before {late[0]}",
             )
+        if step.name == "lens_shading" and scattered and "demosaic" not in names:
+            found.add(path, *SCATTERED)
         if step.name == "demosaic" and not mosaic:
             found.add(path, "every pixel of this array has all its colors", "remove this step")
         elif step.value == "edge-aware" and scattered:

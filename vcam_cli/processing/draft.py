@@ -27,6 +27,8 @@ class Draft:
     """What is applied so far."""
     balanced: bool = False
     """Whether a step has balanced white."""
+    evened: bool = False
+    """Whether a step has undone the falloff of the light."""
     curve: tone.Curve = 1.0
     """Tone curve of the render."""
     tone: Any = None

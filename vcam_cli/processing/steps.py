@@ -28,6 +28,7 @@ from vcam_cli.processing import (
     foreign_step,
     jpeg,
     lens_distortion,
+    lens_shading,
     picture_steps,
     remosaic,
     scattered_pixels,
@@ -235,7 +236,9 @@ def _color_correction(draft: Draft, step: Step, path: Path) -> Draft:
         if after <= 0 < white.max():
             raise bad(path, "this matrix maps white to 0 or less", "let its rows add up to about 1")
     ceilings = draft.apply_to_colors(np.full(len(white), context.saturated_dn))
-    recover = (Highlights(tuple(ceilings.tolist())),) if np.isfinite(ceilings).all() else ()
+    even = context.shading if draft.evened else None
+    highlights = Highlights(tuple(ceilings.tolist()), context.colors, even, draft.dn.shape[-2])
+    recover = (highlights,) if np.isfinite(ceilings).all() else ()
     return replace(
         draft.with_operations(*recover, correction),
         context=replace(context, colors=color_correction.DISPLAY),
@@ -274,6 +277,15 @@ def _sharpen(draft: Draft, step: Step, path: Path) -> Draft:
     mask = step.value
     work = partial(picture_steps.sharpened, radius=mask.radius, amount=mask.amount)
     return _with_neighbors(draft, work, picture_steps.blur_reach(mask.radius))
+
+
+def _lens_shading(draft: Draft, step: Step, path: Path) -> Draft:
+    context = draft.context
+    if context.shading is None:
+        note = "processing.lens_shading changes nothing here: no simulated light falls off"
+        return replace(draft, notes=(*draft.notes, note))
+    even = lens_shading.EvenLight(context.shading, context, draft.dn.shape[-2])
+    return replace(draft.with_operations(even), evened=True)
 
 
 def _lens_distortion(draft: Draft, step: Step, path: Path) -> Draft:
@@ -337,6 +349,7 @@ STEPS: dict[str, Apply] = {
     "denoise": _denoise,
     "sharpen": _sharpen,
     "gamut_mapping": _gamut_mapping,
+    "lens_shading": _lens_shading,
     "lens_distortion": _lens_distortion,
     "tone": _tone,
     "gamma": _gamma,

@@ -23,8 +23,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.processing_steps import Step
+from vcam_cli.effects.base import of_kind
+from vcam_cli.effects.pixel_signal import Gain
+from vcam_cli.effects.shading import ArrayShading
 from vcam_cli.processing import Context, Patches, ProcessedPicture, process
 from vcam_cli.simulation import autofocus, cost_model
 from vcam_cli.simulation.bracket import bracket_cameras, bracket_note, longest_of, merged_bracket
@@ -190,8 +195,16 @@ def picture_of(frame: Frame, workers: int) -> Callable[[Sequence[Step]], Process
         planes=frame.layout.full_color,
         layout=frame.layout if frame.layout.is_scattered else None,
         correction=frame.solved.lens_correction,
+        shading=_shading(frame),
     )
     return partial(process, frame.picture_dn, context, workers=workers)
+
+
+def _shading(frame: Frame) -> ArrayShading | None:
+    """Return how the simulated light falls off; None where it does not."""
+    places = (np.asarray(at, np.float32) for at in (frame.layout.picture_x, frame.layout.picture_y))
+    found = ArrayShading(of_kind(frame.plan.active, Gain), *places)
+    return found if found.falls(frame.mosaic.colors) else None
 
 
 def _patches(frame: Frame) -> Patches:

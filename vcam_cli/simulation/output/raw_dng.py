@@ -25,6 +25,7 @@ from vcam_cli.camera.derived.mosaic import BLOCKS
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.noise.quantization import Quantization
 from vcam_cli.effects.pixel_signal import Gain
+from vcam_cli.effects.shading import correction
 from vcam_cli.effects.warps import StillWarp
 from vcam_cli.errors import bad
 from vcam_cli.files.images.dng import (
@@ -55,8 +56,6 @@ MAP_POINTS = 65
 """Rows and columns of a gain map."""
 PREVIEW_SIZE = 1024
 """Most rows and columns of the small picture."""
-LARGEST_GAIN = 64.0
-"""Of a gain map: what is darker than that is left dark."""
 TOP = (1 << MOST_BITS) - 1
 """Level of the highest code of a curve made straight."""
 _PATH = ("output", "dng")
@@ -202,14 +201,9 @@ def _shading(frame: Frame) -> Array | None:
     half_width, half_height = g.columns * g.pitch_x / 2, g.rows * g.pitch_y / 2
     x, y = (np.linspace(-half, half, MAP_POINTS) for half in (half_width, half_height))
     colors = frame.mosaic.colors[: 1 if all(effect.is_neutral for effect in gains) else None]
-    share, axis = dict.fromkeys(colors, np.ones((MAP_POINTS, MAP_POINTS))), np.zeros(1)
-    for effect in gains:
-        for color in colors:
-            gain = effect.of_color(color)
-            share[color] = share[color] * gain.gain(x, y) / gain.gain(axis, axis)
-    if all(np.ptp(of_color) == 0 for of_color in share.values()):
+    found = {color: correction(gains, color, x, y) for color in colors}
+    if all(np.ptp(of_color) == 0 for of_color in found.values()):
         return None
-    found = {c: 1 / np.maximum(of_color, 1 / LARGEST_GAIN) for c, of_color in share.items()}
     if not frame.solved.has_mosaic:
         return np.stack(list(found.values()))[None, None]
     return np.array([[[found.get(c, found[colors[0]])] for c in row] for row in frame.mosaic.block])
