@@ -57,12 +57,12 @@ def test_discs_in_cells_against_points():
     assert abs(cells - fine).max() < 1.5e-2
 
 
-@pytest.mark.parametrize("part", [0.2, 0.4, 0.6])
+@pytest.mark.parametrize("part", [0.2, 0.4, 0.6, 1.1, 1.5])
 @pytest.mark.parametrize("error", [0.005, 0.0025, 0.001, 0.0003])
 def test_cells_err_no_more_than_asked_for(error, part):
     """Against nine times as many cells, each of them divided as often as can be.
 
-    Cells are a part of the smallest leaf's radius wide, the last of them divided before.
+    Cells are a part of the smallest leaf's radius wide, the last three of them painted in parts.
     """
     mix, frame = np.ones((1, len(dead_leaves.PIGMENTS))), Frame(1.0, 0.7)
     edges = cell_edges(400, part * dead_leaves.SMALLEST)

@@ -227,11 +227,12 @@ class DeadLeaves(Chart):
     """Whole number, 0 or more."""
     unit: float
     """Longer side of the frame [m]."""
-    divided: int = MOST
-    """How often cells are divided in which edges meet."""
+    cell_error: float = 0.0
+    """Rms error that averages over cells may have, relative to white."""
     keep: bool | None = None
     """Whether visible leaves are kept for cameras that see them on the same cells; None until the
     whole grid is known."""
+    divided = property(lambda self: divisions(self.cell_error))
     edge_seconds = property(lambda self: EDGE_SECONDS[0] + EDGE_SECONDS[1] * self.divided)
     undivided = property(lambda self: self.unit / FINEST)
 
@@ -319,13 +320,17 @@ class DeadLeaves(Chart):
     def _paint_parts(
         self, parts: int, x_edges: Array, y_edges: Array, mix: Array, out: Array
     ) -> None:
-        """Write the averages over the cells into `out`, painted in bands of their parts."""
+        """Write the averages over the cells into `out`, painted in bands of their parts.
+
+        Parts err on their own, so that their mean errs by less.
+        """
+        each = replace(self, cell_error=self.cell_error * parts)
         x, (rows, columns) = _divided(x_edges, parts), out.shape[1:]
         band = max(1, AT_ONCE // (parts**2 * columns))
         for top in range(0, rows, band):
             cells = out[:, top : top + band]
             y = _divided(y_edges[top : top + band + 1], parts)
-            fine = self.crop_to_cells(x, y).averages(x, y, mix)
+            fine = each.crop_to_cells(x, y).averages(x, y, mix)
             cells[:] = cell_means(fine, parts)
 
     def _placed_leaves(self, x: Array, y: Array) -> PlacedLeaves:
@@ -391,7 +396,7 @@ def dead_leaves(seed: int, frame: Frame, cell_error: float = 0.0) -> DeadLeaves:
     DeadLeaves
         The chart.
     """
-    return DeadLeaves(seed, max(frame.width, frame.height), divisions(cell_error))
+    return DeadLeaves(seed, max(frame.width, frame.height), cell_error)
 
 
 def _every_nth_edge(step: int, edges: Array) -> Array:
