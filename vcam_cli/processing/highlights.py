@@ -53,7 +53,7 @@ class Highlights:
     def _levels(self, block: Block) -> Sequence[np.ndarray]:
         """Return the planes as bright as the sensor has seen them."""
         if self.shading is None:
-            return block.planes
+            return list(block.planes)
         first, count = block.first_row, block.planes.shape[1]
         rows = mirrored_index(np.arange(first, first + count), self.rows)
         raised = (self.shading.correction(color, rows, slice(None)) for color in self.colors)
