@@ -18,14 +18,10 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.effects.base import of_kind
+from vcam_cli.effects.noise.fpn_maps import PatternMaps
 from vcam_cli.effects.order import ORDER
 from vcam_cli.effects.pixel_signal import Charge
-from vcam_cli.effects.signal_chain import (
-    NoiseSource,
-    Quantizer,
-    full_well,
-    noise_sources,
-)
+from vcam_cli.effects.signal_chain import NoiseSource, Quantizer, full_well, noise_sources
 from vcam_cli.readout import binned_readout, exposure
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.solve.effects import camera_effects
@@ -128,6 +124,8 @@ def variance_shares(ready: Prepared, full: float, workers: int) -> dict[str, flo
     active, group = ready.plan.active, ready.layout.binning_groups.binning
     row_noise = [source.split()[2] for source in of_kind(active, NoiseSource)]
     shape = SQUARE if any(row_noise) else FLAT
+    for maps in of_kind(active, PatternMaps):
+        shape = maps.shape  # measured pixels are those of the array
     shape = (shape[0] + -shape[0] % group.rows, shape[1] + -shape[1] % group.columns)
     levels = np.unique(ready.plan.levels)[[0, len(set(ready.plan.levels)) // 2, -1]]
     fields = [np.full(shape, level) for level in levels]
