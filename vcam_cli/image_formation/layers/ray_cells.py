@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 import scipy.fft
@@ -17,7 +16,6 @@ from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.image_formation.layers.occlusion import Sums
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.transfer_functions import Transfer
-from vcam_cli.physics.cache import ByteCache
 
 BORDER = 4
 """Pixels around a window from which diffraction and diffusion bring light."""
@@ -27,8 +25,6 @@ ENTRIES = 1024
 """Frequencies at which a round transfer function is tabulated."""
 POINTS = 4
 """Rays of a group for which what diffraction passes is computed, about."""
-KEPT = 1 << 26
-"""Bytes that are kept of what lenses pass: many windows have one shape."""
 RINGS, SECTORS = 4, 8
 """Rings of equal area and sectors of the pupil, opposite ones together: groups of rays that
 diffraction treats alike."""
@@ -164,7 +160,6 @@ class SharpImage:
         blurs = (*lens, *of_kind(behind, Blur))
         self._transfer = Transfer(path.transfer.wavelengths, white, blurs)
         self._known: dict[tuple[int, tuple[int, int]], Array] = {}
-        self._shares = ByteCache[Array](KEPT)
 
     def groups(self, rays: Array) -> list[Array]:
         """Return rays in groups; in a group about the same waves diffract.
@@ -219,11 +214,10 @@ class SharpImage:
         light, cover = light / len(rays), cover[:, None] / len(rays)
         if self.is_local:
             return light, cover
-        shape = _fast_shape(light)
+        shape = light.shape[-2:]
         transfer = self._on(cells, shape)
         light, cover = (
-            scipy.fft.irfft2(scipy.fft.rfft2(image, shape) * transfer, shape)
-            for image in (light, cover)
+            scipy.fft.irfft2(scipy.fft.rfft2(image) * transfer, shape) for image in (light, cover)
         )
         return light, cover
 
@@ -233,13 +227,12 @@ class SharpImage:
         cover: Array | float = 0.0
         passed: Array | float = 0.0
         shape = (0, 0)
-        for number, (rays, own_light, own_cover) in enumerate(groups):
-            shape = _fast_shape(own_light)
-            key = cells.per_pixel, cells.single, shape, number
-            share = self._shares.get(key, partial(self._passed, cells, shape, rays))
+        for rays, own_light, own_cover in groups:
+            shape = own_light.shape[-2:]
+            share = self._passed(cells, shape, rays)
             passed = passed + len(rays) * share
-            light = light + scipy.fft.rfft2(own_light, shape) * share
-            cover = cover + scipy.fft.rfft2(own_cover[:, None], shape) * share
+            light = light + scipy.fft.rfft2(own_light) * share
+            cover = cover + scipy.fft.rfft2(own_cover[:, None]) * share
         transfer = self._on(cells, shape)
         # How many pairs of points there are is that of the lens's own transfer, exactly.
         transfer = np.divide(
@@ -318,15 +311,6 @@ class SharpImage:
         table = np.linspace(0, np.hypot(fx.max(), np.abs(fy).max()), ENTRIES)
         radial, length = self._transfer.radial_response(table)[0], np.hypot(fx[None], fy[:, None])
         return np.stack([np.interp(length, table, one) for one in radial])
-
-
-def _fast_shape(image: Array) -> tuple[int, int]:
-    """Return the least rows and columns that hold an image and are transformed fast.
-
-    Beyond the border of a window there is no light then, in the place of that from its other side.
-    """
-    rows, columns = (scipy.fft.next_fast_len(n, real=True) for n in image.shape[-2:])
-    return rows, columns
 
 
 def _spread(points: Array) -> Array:
