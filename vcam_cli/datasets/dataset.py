@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
@@ -28,6 +28,7 @@ from vcam_cli.errors import bad
 from vcam_cli.files.points_store import SweepFolder
 from vcam_cli.files.records import Fingerprint
 from vcam_cli.files.report import hash_text, to_json
+from vcam_cli.parallel import ThreadPool
 from vcam_cli.progress import Observer, Silent
 from vcam_cli.simulation.output import provenance
 from vcam_cli.sweeps.execution import Execution
@@ -145,7 +146,7 @@ class _Packing:
     def __init__(self, folder: SweepFolder) -> None:
         self._folder, self._lock, self._count = folder, Lock(), 0
         self._alone = ExitStack()
-        self._pool = ThreadPoolExecutor(PACKERS)
+        self._pool = ThreadPool(PACKERS)
         self._waiting: list[Future[None]] = []
 
     def __enter__(self) -> Self:
