@@ -2,29 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import math
-from pathlib import Path
 
 import numpy as np
 
+from tests.lenses.oracle import FIRST_ORDER, LENSES, ORACLE
 from vcam_cli.lenses.fields import View
 from vcam_cli.lenses.files import shipped_lens
 from vcam_cli.lenses.paraxial import paraxial
 from vcam_cli.lenses.pupils import pupils
 from vcam_cli.physics import zernike
-
-ORACLE = json.loads((Path(__file__).parents[1] / "data" / "lens_oracle.json").read_text("utf-8"))
-LENSES = ("cooke-triplet", "double-gauss", "r-biotar", "sonnar", "topogon")
-FIRST_ORDER = {
-    "efl": "focal_length",
-    "bfl": "back_focus",
-    "front_focus_from_first": "front_focus",
-    "entrance_pupil_from_first": "entrance_pupil",
-    "exit_pupil_from_last": "exit_pupil",
-    "exit_pupil_diameter": "exit_pupil_diameter",
-    "stop_semi_diameter": "stop_semi_diameter",
-}
 
 
 def first_order(view: View, known: dict) -> float:

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
+from tests.lenses.oracle import LENSES
 from vcam_cli.lenses.fields import View
 from vcam_cli.lenses.files import shipped_lens
 
-LENSES = ("cooke-triplet", "double-gauss", "r-biotar", "sonnar", "topogon")
 DISTANCE = 20e-3
 """From the plane through the first vertex back to where rays start there [m]."""
 

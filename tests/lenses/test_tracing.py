@@ -1,14 +1,13 @@
 """Rays, pupils and wavefronts against a tracer that shares no code, and against closed forms."""
 
-import json
 import math
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.lenses.oracle import FIRST_ORDER, LENSES, ORACLE
 from vcam_cli.lenses.fields import View
 from vcam_cli.lenses.files import shipped_lens
 from vcam_cli.lenses.glasses import AIR, ModelGlass
@@ -16,18 +15,6 @@ from vcam_cli.lenses.paraxial import paraxial
 from vcam_cli.lenses.prescription import Prescription, Surface
 from vcam_cli.lenses.pupils import pupils
 from vcam_cli.physics import zernike
-
-ORACLE = json.loads((Path(__file__).parents[1] / "data" / "lens_oracle.json").read_text("utf-8"))
-LENSES = ("cooke-triplet", "double-gauss", "r-biotar", "sonnar", "topogon")
-PARAXIAL = {
-    "efl": "focal_length",
-    "bfl": "back_focus",
-    "front_focus_from_first": "front_focus",
-    "entrance_pupil_from_first": "entrance_pupil",
-    "exit_pupil_from_last": "exit_pupil",
-    "exit_pupil_diameter": "exit_pupil_diameter",
-    "stop_semi_diameter": "stop_semi_diameter",
-}
 
 
 @cache
@@ -50,7 +37,7 @@ def disk():
 def test_first_order_data(name):
     for micrometers, expected in ORACLE[name]["paraxial"].items():
         found = paraxial(view(name).lens, float(micrometers) * 1e-6)
-        for key, attribute in PARAXIAL.items():
+        for key, attribute in FIRST_ORDER.items():
             value = getattr(found, attribute) * 1e3
             assert value == pytest.approx(expected[key], rel=1e-12, abs=1e-10), (key, micrometers)
     # printed with 15 digits

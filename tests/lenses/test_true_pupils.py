@@ -1,19 +1,17 @@
 """OTFs on the true pupil: closed forms, and a dense correlation of the oracle's wavefronts."""
 
-import json
 import math
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.lenses.oracle import ORACLE
 from vcam_cli.lenses.fields import View
 from vcam_cli.lenses.files import shipped_lens
 from vcam_cli.lenses.wavefronts import trace_field
 from vcam_cli.physics import aberration, shaped_pupil, zernike
 
-ORACLE = json.loads((Path(__file__).parents[1] / "data" / "lens_oracle.json").read_text("utf-8"))
 SCALE = 0.1
 """Of the lenses: wavefronts scale with them, and a tenth is correlated in little time."""
 

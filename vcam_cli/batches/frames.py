@@ -242,7 +242,7 @@ def _batches(
             for start in range(0, count, batch):
                 numbers = range(first + start, first + min(start + batch, count))
                 shown = [(number - first) // asked.frames_each for number in numbers]
-                yield _taken(taker, asked, rates, shown, numbers, first_picture, white)
+                yield _frame_batch(taker, asked, rates, shown, numbers, first_picture, white)
             first, first_picture = first + count, first_picture + len(stack)
 
 
@@ -348,7 +348,7 @@ def _require(
     require(device, needed, f"{count} frames of {g.rows} x {g.columns} pixels")
 
 
-def _taken(
+def _frame_batch(
     taker: BatchCamera,
     asked: _Asked,
     rates: Array,

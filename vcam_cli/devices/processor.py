@@ -70,7 +70,7 @@ class Processor:
         return self.put(np.array([counter_noise.seed_key(seed) for seed in seeds], np.uint64))
 
     def normals(self, keys: Array, name: str, sample: int, count: int, dtype: DTypeLike) -> Array:
-        """Return standard normal numbers (B, count); `counter_noise` says of which words.
+        """Return standard normal numbers (B, count) of the words of `counter_noise`.
 
         Parameters
         ----------

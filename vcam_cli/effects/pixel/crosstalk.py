@@ -90,7 +90,7 @@ class Crosstalk(NeighborSharing):
         """Return the contrast (n,) that it leaves of gray waves along a row."""
         out = np.ones(len(frequency), complex)
         coupling = () if self.after is None else (np.array(self.after),)
-        for kernel in (*(_at(kernels, wavelength) for kernels in self.before), *coupling):
+        for kernel in (*(_kernel(kernels, wavelength) for kernels in self.before), *coupling):
             line = kernel.sum(axis=0)
             places = (np.arange(len(line)) - len(line) // 2) * self.pitch[0]
             out *= np.exp(-2j * np.pi * np.multiply.outer(frequency, places)) @ line
@@ -101,7 +101,7 @@ class Crosstalk(NeighborSharing):
         return self.largest_share * signal.full_signal
 
 
-def _at(kernels: Kernels, wavelength: float) -> Array:
+def _kernel(kernels: Kernels, wavelength: float) -> Array:
     """Return the kernel at a wavelength [m], in the size of the largest."""
     found = [np.array(kernel) for _, kernel in kernels.points]
     height, width = (max(kernel.shape[axis] for kernel in found) for axis in (0, 1))
