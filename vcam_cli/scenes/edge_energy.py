@@ -18,6 +18,9 @@ RINGING = 0.1
 """Part of an edge's height by which light beside it may err: edges between two lights that both
 fill pixels count up to the error that would leave one of them unsaturated."""
 
+ALIGNED = 0.02
+"""Slope of sides that lie along rows or columns: over 50 pixels they move by one at most."""
+
 
 @dataclass(frozen=True)
 class Region:
@@ -116,6 +119,25 @@ def counted_height(first: Array, second: Array, ceiling: float) -> Array:
     height = np.abs(first - second)
     counts = np.minimum(first, second) < ceiling + RINGING * height
     return np.where(counts, np.square(height), 0.0)
+
+
+def outline_energy(start: Array, stop: Array, height: float, region: Region) -> EdgeEnergy:
+    """Return the energy of straight edges of one height.
+
+    Parameters
+    ----------
+    start, stop : Array
+        Ends (2, n) of the edges, x and y [m].
+    height : float
+        Their squared height, as `counted_height` returns it.
+    region : Region
+        Where edges count.
+    """
+    lengths = region.lengths_inside(start, stop)
+    sides = np.abs(stop - start)
+    is_aligned = sides.min(axis=0) <= ALIGNED * sides.max(axis=0)
+    aligned, oblique = (float(lengths[some].sum()) for some in (is_aligned, ~is_aligned))
+    return EdgeEnergy(height * aligned / region.area, height * oblique / region.area)
 
 
 def rectangle_energy(

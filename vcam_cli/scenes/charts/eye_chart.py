@@ -25,7 +25,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.scenes import polygons
 from vcam_cli.scenes.base import Chart, Frame
-from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, counted_height
+from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, counted_height, outline_energy
 
 PAPER, INK = 0.9, 0.04
 """Reflectances of paper and ink."""
@@ -35,8 +35,6 @@ FILL_FACTOR = 0.92
 """Part of the frame that the letters fill."""
 STROKES = 5
 """Strokes that a letter is wide and high."""
-ALIGNED = 0.02
-"""Slope of sides that lie along rows or columns: over a letter they move by a part of a stroke."""
 CHORDS = 720
 """Chords of a whole circle: they stay within 1e-5 of the radius."""
 
@@ -172,12 +170,8 @@ class EyeChart(Chart):
         """Return the energy of the letters' outlines."""
         s = self.letters
         start, stop = np.stack([s.x0, s.y0]), np.stack([s.x1, s.y1])
-        lengths = region.lengths_inside(start, stop)
         dark, bright = np.array([INK, PAPER]) * float(level[0])
-        height = float(counted_height(dark, bright, ceiling)) / region.area
-        is_aligned = np.abs(stop - start).min(axis=0) <= ALIGNED * np.abs(stop - start).max(axis=0)
-        aligned, oblique = (float(lengths[some].sum()) for some in (is_aligned, ~is_aligned))
-        return EdgeEnergy(height * aligned, height * oblique)
+        return outline_energy(start, stop, float(counted_height(dark, bright, ceiling)), region)
 
     def _mix_levels(self, ink: Array, mix: Array, out: Array) -> None:
         light = (PAPER + (INK - PAPER) * ink).astype(mix.dtype)

@@ -13,7 +13,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.scenes import polygons
 from vcam_cli.scenes.base import Chart
-from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, counted_height
+from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, counted_height, outline_energy
 
 MEAN = 0.5
 """Mean reflectance."""
@@ -51,10 +51,9 @@ class SiemensStar(Chart):
         far = 2 * math.hypot(*np.abs(region.center) + region.size)
         angle = (np.arange(2 * self.spokes) + 0.5) * (math.pi / self.spokes)
         ends = far * np.stack([np.cos(angle), np.sin(angle)])
-        length = float(region.lengths_inside(np.zeros_like(ends), ends).sum())
         dark, bright = (MEAN * (1 + s * self.contrast) * float(level[0]) for s in (-1, 1))
         height = float(counted_height(np.array(dark), np.array(bright), ceiling))
-        return EdgeEnergy(oblique=height * length / region.area)
+        return outline_energy(np.zeros_like(ends), ends, height, region)
 
     def _triangles(self, reach: float) -> polygons.Sides:
         """Return the bright spokes up to a distance [m]."""
