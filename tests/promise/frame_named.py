@@ -130,6 +130,12 @@ CASES: dict[str, Frame] = {
     "the last row of 21 x 13": before(lit((21, 13), 0.0, 20), (21, 13), 4e-6, 2.8),
     "checks, 3 x 5": checks(3, 5),
     "checks, 2 x 2": checks(2, 2),
+    "a lit sample cut off above black": before(
+        lit((40, 40), 0.0, (38, 13)), (10, 20), 4e-6, 2.8, {"exposure": {"time": "20 ms"}}
+    ),
+    "a star of three spokes, 8 x 8": chart(
+        {"chart": "siemens-star", "spokes": 3, "contrast": 0.43}, (8, 8), 2.3e-6, 7.3
+    ),
     "starter before a white column": starter(300),
     **{
         f"slanted edge, {size[0]} x {size[1]}, f/{f_number}": edge(size, f_number)

@@ -23,7 +23,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -170,10 +169,9 @@ class CubeScene(ImageScene):
         paint_by_bands(paint, height, width, workers)
         return out
 
-    @cached_property
-    def brightest(self) -> float:
-        """Largest sample of a band over that of white there."""
-        blocks = (self.picture[top : top + ROWS] for top in range(0, len(self.picture), ROWS))
+    def _largest(self, samples: Array) -> float:
+        """Return the largest sample of a band over that of white there."""
+        blocks = (samples[top : top + ROWS] for top in range(0, len(samples), ROWS))
         most = np.max([block.max(axis=(0, 1)) for block in blocks], axis=0) / self.units
         return max(float(most.max()), 0.0)
 

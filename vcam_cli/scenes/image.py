@@ -104,6 +104,8 @@ class ImageScene(SampledScene):
     """Samples of black on every side, down and across."""
     seen: tuple[float, float]
     """Parts of the file's height and width that the array sees."""
+    cut: tuple[Array, ...]
+    """Samples of the file beyond array and margin, in rectangles (h, w, K)."""
 
     def planes(self, mix: Array, workers: int = 1) -> Array:
         """Return the linear combinations of the channels (R, ny, nx)."""
@@ -160,7 +162,15 @@ class ImageScene(SampledScene):
     @cached_property
     def brightest(self) -> float:
         """Largest sample, in units of white."""
-        return max(float(self.picture.max(initial=0.0)), 0.0)
+        return self._largest(self.picture)
+
+    @cached_property
+    def brightest_cut(self) -> float:
+        """Largest sample beyond array and margin, in units of white; 0 where there is none."""
+        return max(map(self._largest, self.cut), default=0.0)
+
+    def _largest(self, samples: Array) -> float:
+        return max(float(samples.max(initial=0.0)), 0.0)
 
     def change_bounds(
         self, losses: Sequence[BlurLoss], geometry: Geometry, ceiling: float, allowed: float
@@ -301,6 +311,13 @@ def image_scene(
         width, height = extent_with_margin(view)
         pitch_x = _visible_pitch(pitch_x, shape[1], width)
         pitch_y = _visible_pitch(pitch_y, shape[0], height)
+    bottom, right = rows - top, columns - left
+    beside = (
+        picture[:top],
+        picture[bottom:],
+        picture[top:bottom, :left],
+        picture[top:bottom, right:],
+    )
     return ImageScene(
         spectra=spectra,
         white=white,
@@ -309,10 +326,11 @@ def image_scene(
         pitch_y=pitch_y,
         samples="squares",
         dtype=view.dtype,
-        picture=picture[top : rows - top, left : columns - left],
+        picture=picture[top:bottom, left:right],
         black=(max(-placed.cut_y, 0), max(-placed.cut_x, 0)),
         seen=(
             min(view.size[1] / (placed.pitch * rows), 1.0),
             min(view.size[0] / (placed.pitch * columns), 1.0),
         ),
+        cut=tuple(samples for samples in beside if math.prod(samples.shape)),
     )

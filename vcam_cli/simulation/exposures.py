@@ -59,7 +59,7 @@ def exposures(
     if fills_first is not first:
         seen = exposed_as(seen, fills_first, picture)
     seen = replace(seen, path=replace(seen.path, optional=()))
-    light = formed_light(seen, run)
+    seen, light = formed_light(seen, picture, run)
     for number, each in enumerate(solved):
         if wanted is not None and number not in wanted:
             continue

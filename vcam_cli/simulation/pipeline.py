@@ -115,7 +115,7 @@ def prepare_light(solved: Solved, picture: ScenePicture, run: Run) -> Prepared:
 def _prepare(solved: Solved, picture: ScenePicture, run: Run) -> Prepared:
     """Return the same where times are given, or nothing moves."""
     seen = scene_light(solved, picture, run)
-    light = formed_light(seen, run)
+    seen, light = formed_light(seen, picture, run)
     with run.stages("exposure"):
         exposed = expose(seen, light)
         return plan_frame(seen, light, exposed, run)

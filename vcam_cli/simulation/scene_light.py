@@ -25,6 +25,7 @@ from vcam_cli.quality.display import display_screen
 from vcam_cli.readout import auto_exposure, exposure
 from vcam_cli.scenes.base import ChartScene, HarmonicScene
 from vcam_cli.scenes.depth_scene import DepthScene
+from vcam_cli.scenes.image import ImageScene
 from vcam_cli.scenes.layered import AnyScene, LayeredScene
 from vcam_cli.scenes.sampled_chart import sampled_chart
 from vcam_cli.scenes.waves import WaveScene
@@ -41,6 +42,9 @@ from vcam_cli.solve.solved import Solved
 
 ASSUMED = 0.9
 """Full signal over the scene's brightest light, as assumed before there is any signal."""
+DARKER = 2.0
+"""Full signal that a margin was made for over that of the array, above which it is widened: it errs
+by no more than this times its share of the tolerance, `bandwidth.MARGIN_SHARE`."""
 OVERFULL = 2.0
 """Full wells of light above which a pixel counts as full, if six standard deviations of its noise
 leave it so."""
@@ -73,6 +77,9 @@ class SceneLight:
     """Memory of what was read of the scene [bytes]."""
     light_key: str
     """That of the camera."""
+    overexposure: float = 1.0
+    """Brightest light beside the array over full signal that the scene's margin is wide enough
+    for."""
 
 
 def scene_light(solved: Solved, picture: ScenePicture, run: Run) -> SceneLight:
@@ -142,8 +149,8 @@ def exposed_as(seen: SceneLight, solved: Solved, picture: ScenePicture) -> Scene
     """
     effects, scene = seen.path.effects, seen.scene
     levels = _levels(solved, scene, seen.white_rate)
-    overexposure = _brightest_around(scene) * float(seen.white_rate.max()) / levels.ceiling
-    if overexposure > 1:  # of what lies beside the array, too
+    overexposure = max(_rate_around(seen) / levels.ceiling, 1.0)
+    if overexposure > 1:
         scene = _scene(solved, picture, effects, overexposure)
     path = replace(
         seen.path,
@@ -152,7 +159,7 @@ def exposed_as(seen: SceneLight, solved: Solved, picture: ScenePicture) -> Scene
         fullness=levels.fullness,
         layers=layer_optics(solved, effects, scene),
     )
-    return replace(seen, solved=solved, scene=scene, path=path)
+    return replace(seen, solved=solved, scene=scene, path=path, overexposure=overexposure)
 
 
 @dataclass(frozen=True)
@@ -193,26 +200,61 @@ def rate_of_full(seen: SceneLight, solved: Solved) -> float:
     return _levels(solved, seen.scene, seen.white_rate).ceiling
 
 
-def formed_light(seen: SceneLight, run: Run) -> photon_rate.Rate:
+def formed_light(
+    seen: SceneLight, picture: ScenePicture, run: Run
+) -> tuple[SceneLight, photon_rate.Rate]:
     """Return the light of the whole exposure on the lattice.
+
+    Margins are first as wide as white beside the array needs. Before an array that turns out much
+    darker, the tails of what lies beside it are a larger part of full signal: it gets wider ones.
 
     Parameters
     ----------
     seen : SceneLight
         The scene before its camera.
+    picture : ScenePicture
+        What the scene's files hold.
     run : Run
         How it is computed.
 
     Returns
     -------
-    Rate
+    seen : SceneLight
+        The scene, its margin wide enough.
+    light : Rate
         Photo-electrons per second in every place of the lattice [e/s].
     """
-    form = partial(photon_rate.photo_rate, seen.path, seen.scene, seen.solved.layout.planes)
-    with run.stages("optics"):
-        if run.rate_cache is None:
-            return form()
-        return run.rate_cache.rate(seen.light_key, seen.path.ceiling, form)
+    while True:
+        form = partial(photon_rate.photo_rate, seen.path, seen.scene, seen.solved.layout.planes)
+        with run.stages("optics"):
+            if run.rate_cache is None:
+                light = form()
+            else:
+                light = run.rate_cache.rate(seen.light_key, seen.path.ceiling, form)
+            wider = _widened(seen, picture, light)
+        if wider is seen:
+            return seen, light
+        seen = wider
+
+
+def _widened(seen: SceneLight, picture: ScenePicture, light: photon_rate.Rate) -> SceneLight:
+    """Return the scene with the margin that its light needs; itself where it has that.
+
+    Layers predict themselves what their margins change.
+    """
+    around, time = _rate_around(seen), seen.solved.exposure.time
+    if around == 0 or isinstance(seen.scene, DepthScene | LayeredScene):
+        return seen
+    full = min(float(light.values.max(initial=0.0)), seen.path.ceiling)
+    full = max(full, 1 / time if time else 0.0)  # as defined, at least one electron
+    overexposure = around / full if full > 0 else math.inf
+    if overexposure <= DARKER * seen.overexposure:
+        return seen
+    scene = _scene(seen.solved, picture, seen.path.effects, overexposure)
+    if scene.shape == seen.scene.shape:
+        return seen
+    key = f"{seen.light_key} {scene.shape}"
+    return replace(seen, scene=scene, light_key=key, overexposure=overexposure)
 
 
 def light_during(seen: SceneLight, light: photon_rate.Rate, start: float, stop: float) -> Array:
@@ -274,11 +316,21 @@ def _brightest(scene: AnyScene) -> float:
     return flat.chart.brightest if isinstance(flat, HarmonicScene) else flat.brightest
 
 
-def _brightest_around(scene: AnyScene) -> float:
-    """Return the brightest light that a chart has beyond the array, relative to white; else 0."""
+def _rate_around(seen: SceneLight) -> float:
+    """Return the rate of the brightest light that is cut off beside the array [e/s].
+
+    It is 0 where nothing is. Charts go on without end, and their light beyond the margin is not
+    known better than that of the whole.
+    """
+    scene = seen.scene
     if isinstance(scene, DepthScene):  # errors of its layers are relative to white
-        return 1.0
-    return _brightest(scene) if isinstance(scene, ChartScene | LayeredScene) else 0.0
+        brightest = 1.0
+    elif isinstance(scene, ImageScene):
+        brightest = scene.brightest_cut
+    else:
+        charted = isinstance(scene, ChartScene | LayeredScene)
+        brightest = _brightest(scene) if charted else 0.0
+    return brightest * float(seen.white_rate.max())
 
 
 def _fullness(solved: Solved, scene: AnyScene, white_rate: float) -> float:
