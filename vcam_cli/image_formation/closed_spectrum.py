@@ -53,7 +53,7 @@ def closed_spectrum(
         return product_spectrum(scene, mix, axes, dtype)
     rectangles = scene.rectangles(mix)
     assert rectangles is not None
-    discs = scene.chart.discs(np.asarray(mix, float))
+    discs = scene.discs(np.asarray(mix, float))
     if not discs:
         return rectangle_spectrum(rectangles, scene.shape, axes, dtype)
     even = rectangle_spectrum(rectangles, scene.shape, axes, np.float64)

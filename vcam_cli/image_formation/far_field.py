@@ -61,6 +61,9 @@ class FarPart:
     scene: ChartScene
     sign: int
     """1 of an outer rectangle, -1 of an inner."""
+    is_painted: bool
+    """Whether it is painted though it may have a closed form: both rectangles of a ring, or none.
+    Cells that are painted fold what is finer, and only the same error vanishes in the difference."""
 
     def nyquist(self, geometry: Geometry) -> float:
         """Return the Nyquist frequency of its cells, beyond which nothing is left.
@@ -98,7 +101,7 @@ class FarPart:
             Spectrum of R planes.
         """
         x, y = axes(path, self.scene, highest)
-        if not self.scene.is_painted:
+        if not self.is_painted:
             return closed_spectrum(self.scene, mix, (y, x), np.float64)
         terms = y.terms, x.terms
         spectrum, _ = transform_painted(self.scene, mix, terms, np.float64, path.workers)
@@ -272,7 +275,7 @@ def far_parts(
             min(a + 2 * (clear + widest), b) for a, b in zip(sensor, whole.extent, strict=True)
         ]
         more = [_even_cells(size, p) for size, p in zip(reached, pitch, strict=True)]
-        parts += [_part(whole, more, pitch, 1), _part(whole, cells, pitch, -1)]
+        parts += _ring(whole, more, cells, pitch)
         inner = more[0] * pitch[0] * 2, more[1] * pitch[1] * 2
         cells, pitch = [n // GROWTH for n in more], [p * GROWTH for p in pitch]
     return parts
@@ -286,8 +289,17 @@ def _even_cells(size: float, pitch: float) -> int:
     return GROWTH * scipy.fft.next_fast_len(math.ceil(size / pitch / 2 / GROWTH), real=True)
 
 
-def _part(chart: ChartScene, cells: list[int], pitch: list[float], sign: int) -> FarPart:
-    """Return a rectangle of `cells` of a pitch [m] on either side of the center, x and y."""
-    width, height = (2 * n * p for n, p in zip(cells, pitch, strict=True))
-    part = chart.crop((0.0, 0.0), width, height).with_cells((2 * cells[1], 2 * cells[0]))
-    return FarPart(part, sign)
+def _ring(
+    chart: ChartScene, outer: list[int], inner: list[int], pitch: list[float]
+) -> list[FarPart]:
+    """Return the outer and the inner rectangle of a ring.
+
+    They have `outer` and `inner` cells of a pitch [m] on either side of the center, x and y.
+    """
+    parts = []
+    for cells in (outer, inner):
+        width, height = (2 * n * p for n, p in zip(cells, pitch, strict=True))
+        part = chart.crop((0.0, 0.0), width, height)
+        parts.append(part.with_cells((2 * cells[1], 2 * cells[0])))
+    painted = any(part.is_painted for part in parts)
+    return [FarPart(part, sign, painted) for part, sign in zip(parts, (1, -1), strict=True)]

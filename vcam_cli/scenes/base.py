@@ -567,13 +567,28 @@ class ChartScene(SampledScene):
         """Brightest light of the chart, relative to the perfect white."""
         return self.chart.brightest
 
+    def discs(self, mix: Array) -> tuple[LightDisc, ...]:
+        """Return the chart's discs that may touch the grid's area.
+
+        Parameters
+        ----------
+        mix : Array
+            Mixtures (R, K) of the components.
+
+        Returns
+        -------
+        tuple of LightDisc
+            The discs.
+        """
+        return tuple(disc for disc in self.chart.discs(mix) if disc.touches(*self.extent))
+
     def rectangles(self, mix: Array) -> Rectangles | None:
         """Return the grid's area as even rectangles, of a chart that is made of them.
 
-        Its discs are not in them; they must lie within that area.
+        Its discs are not in them; those that touch the area must lie within it.
         """
-        edges, discs = self.chart.edges(), self.chart.discs(mix)
-        if edges is None or not all(disc.lies_within(*self.extent) for disc in discs):
+        edges = self.chart.edges()
+        if edges is None or not all(disc.lies_within(*self.extent) for disc in self.discs(mix)):
             return None
         x, y = (edges_within(e, size / 2) for e, size in zip(edges, self.extent, strict=True))
         middle_x, middle_y = ((e[1:] + e[:-1]) / 2 for e in (x, y))
@@ -595,7 +610,7 @@ class ChartScene(SampledScene):
         if profile is not None:
             return profile_bounds(profile, losses, geometry, ceiling)
         found = self.rectangles(np.eye(components))
-        if found is None or self.chart.discs(np.eye(components)):
+        if found is None or self.discs(np.eye(components)):
             return super().change_bounds(losses, geometry, ceiling, allowed)
         return rectangle_bounds(found.x, found.y, found.values, losses, geometry, ceiling)
 

@@ -61,6 +61,22 @@ class LightDisc:
         inside = abs(self.x) + self.radius <= width / 2
         return inside and abs(self.y) + self.radius <= height / 2
 
+    def touches(self, width: float, height: float) -> bool:
+        """Return whether some of it lies in a centered rectangle; it may say so of a near one.
+
+        Parameters
+        ----------
+        width, height : float
+            Sides of the rectangle [m].
+
+        Returns
+        -------
+        bool
+            Whether it may.
+        """
+        near = abs(self.x) - self.radius < width / 2
+        return near and abs(self.y) - self.radius < height / 2
+
 
 @dataclass(frozen=True)
 class Products:

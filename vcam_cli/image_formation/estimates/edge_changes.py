@@ -73,7 +73,7 @@ def has_straight_edges(scene: Scene) -> TypeGuard[ChartScene]:
     if scene.chart.profile() is not None:
         return True
     none = np.zeros((1, len(scene.spectra)))
-    return scene.rectangles(none) is not None and not scene.chart.discs(none)
+    return scene.rectangles(none) is not None and not scene.discs(none)
 
 
 def exact_changes(path: OpticalPath, scene: ChartScene, blurs: Sequence[Blur]) -> dict[Blur, float]:
