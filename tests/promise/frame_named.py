@@ -136,6 +136,9 @@ CASES: dict[str, Frame] = {
     "a star of three spokes, 8 x 8": chart(
         {"chart": "siemens-star", "spokes": 3, "contrast": 0.43}, (8, 8), 2.3e-6, 7.3
     ),
+    "a star of three spokes, 2 x 2": chart(
+        {"chart": "siemens-star", "spokes": 3, "contrast": 0.35}, (2, 2), 4e-6, 7.2
+    ),
     "starter before a white column": starter(300),
     **{
         f"slanted edge, {size[0]} x {size[1]}, f/{f_number}": edge(size, f_number)

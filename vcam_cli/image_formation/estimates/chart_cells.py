@@ -34,8 +34,9 @@ CELLS_SHARE = 0.4
 SURE = 1.3
 """Error over what is expected of edges that lie anywhere: those of one chart may lie alike to its
 cells. The largest of edges at 0.3 degrees, stars, letters, leaves and cards at f/1.4 to f/11."""
-AROUND = 2
-"""Pixels around the array whose edges count with its own."""
+AROUND = 0, 2
+"""Pixels around the array whose edges count with its own: most where edges lie beside it, none
+where they meet within it."""
 FINER = 1.02
 """Step between numbers of cells that are tried."""
 LEAST, MOST = 1.1, 256.0
@@ -148,10 +149,15 @@ class CellError:
             The error of its cells.
         """
         g = path.geometry
-        around = 2 * AROUND * g.pitch_x, 2 * AROUND * g.pitch_y
-        size = g.sensor_width + around[0], g.sensor_height + around[1]
         level = path.judged_weights.sum(axis=1)
-        energy = scene.chart.edge_energy(Region((0.0, 0.0), size), level, path.ceiling)
+        sizes = (
+            (g.sensor_width + 2 * around * g.pitch_x, g.sensor_height + 2 * around * g.pitch_y)
+            for around in AROUND
+        )
+        found = [
+            scene.chart.edge_energy(Region((0.0, 0.0), size), level, path.ceiling) for size in sizes
+        ]
+        energy = EdgeEnergy(max(e.aligned for e in found), max(e.oblique for e in found))
         pitch = max(g.pitch_x, g.pitch_y)
         return cls(path, energy, min(path.transfer.cutoff, highest / (2 * pitch)))
 
