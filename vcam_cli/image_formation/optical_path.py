@@ -242,8 +242,8 @@ class SpectrumReport:
     oversampling: float = 0.0
     """Highest frequency [pixel Nyquist]; 0 where the scene is known in closed form."""
     lost_rms: float = 0.0
-    """Estimated rms of the signal that a chart's cells and the end of the spectrum leave out; the
-    error of margin, mixtures and tables is not in it [electrons / s]."""
+    """Estimated rms of the signal that a chart's cells and the end of the spectrum leave out and 32
+    bits round; the error of margin, mixtures and tables is not in it [electrons / s]."""
     cells: int = 0
     """Samples of one plane of the scene that were transformed; 0 where its spectrum is known."""
     cells_per_pixel: float = 0.0

@@ -38,6 +38,7 @@ from vcam_cli.image_formation.estimates.bandwidth import (
 from vcam_cli.image_formation.estimates.chart_cells import ChosenCells, cell_grid, cells_per_pixel
 from vcam_cli.image_formation.estimates.effect_changes import changes_by_omission, needed_modes
 from vcam_cli.image_formation.estimates.scene_sampling import (
+    rounding_error,
     sampled_image,
     with_sufficient_precision,
 )
@@ -240,7 +241,9 @@ def _spectral_layers(
     planes = [plane for plane in tables.planes if plane is not None]
     report = SpectrumReport(
         oversampling=image.highest,
-        lost_rms=math.hypot(image.lost_rms, chosen.error if chosen else 0.0),
+        lost_rms=math.hypot(
+            image.lost_rms, chosen.error if chosen else 0.0, rounding_error(path, scene)
+        ),
         cells=0 if isinstance(scene, ChartScene) and not painted else math.prod(scene.shape),
         cells_per_pixel=g.pitch_x / scene.pitch_x if painted else 0.0,
         is_painted=painted is not None,

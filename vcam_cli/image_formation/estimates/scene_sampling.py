@@ -87,10 +87,27 @@ def with_sufficient_precision(path: OpticalPath, scene: SampledScene) -> Optical
         The path, its settings with that `float_width` [bits].
     """
     knobs = path.settings
-    brightest = scene.brightest * float(np.abs(path.transfer.level).sum(axis=0).max())
-    suffices = brightest * SINGLE <= SINGLE_SHARE * knobs.tolerance * path.full
+    suffices = _single_error(path, scene) <= SINGLE_SHARE * knobs.tolerance * path.full
     least = knobs.chart_width if isinstance(scene, ChartScene) else knobs.float_width
     return replace(path, settings=replace(knobs, float_width=least if suffices else 64))
+
+
+def rounding_error(path: OpticalPath, scene: SampledScene) -> float:
+    """Return the rms error of the transforms [e/s]: 0 of 64-bit numbers.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        The path of the light, its settings with the `float_width` of the transforms.
+    scene : SampledScene
+        The scene.
+    """
+    return _single_error(path, scene) if path.settings.float_width == 32 else 0.0
+
+
+def _single_error(path: OpticalPath, scene: SampledScene) -> float:
+    """Return the rms error of transforms of 32-bit numbers [e/s]."""
+    return SINGLE * scene.brightest * float(np.abs(path.transfer.level).sum(axis=0).max())
 
 
 def sampled_image(
