@@ -63,7 +63,7 @@ class FarPart:
     """1 of an outer rectangle, -1 of an inner."""
     is_painted: bool
     """Whether it is painted though it may have a closed form: both rectangles of a ring, or none.
-    Cells that are painted fold what is finer, and only the same error vanishes in the difference."""
+    Painted cells fold what is finer, and only the same error vanishes in the difference."""
 
     def nyquist(self, geometry: Geometry) -> float:
         """Return the Nyquist frequency of its cells, beyond which nothing is left.
