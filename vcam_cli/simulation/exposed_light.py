@@ -185,8 +185,13 @@ def expose(seen: SceneLight, light: photon_rate.Rate, is_planned: bool = True) -
 def _levels(
     layout: Layout, rate: Array, dark: float, time: float, well: float
 ) -> tuple[float, ...]:
-    """Return the signals of the scene at which noise is promised, with the dark [electrons]."""
-    mosaic, planes = layout.charge_pixels[1], rate.ndim == 3
+    """Return the signals of the scene at which noise is promised, with the dark [electrons].
+
+    They are those of the raw frame: means of pixels that are read as one.
+    """
+    mosaic, planes, groups = layout.raw_mosaic, rate.ndim == 3, layout.binning_groups
+    if groups.summed_charges == 1:  # else the nodes are the pixels of the raw frame already
+        rate = groups.sums(rate) / rate.dtype.type(groups.count)
     mosaics = [Mosaic(((color,),)) for color in mosaic.colors] if planes else [mosaic]
     levels = [
         pixelwise.percentiles(plane, colors, PERCENTILES)
