@@ -20,7 +20,7 @@ from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.optics import aberration
 from vcam_cli.effects.optics.aberration import Aberration
 from vcam_cli.effects.optics.diffraction import Diffraction
-from vcam_cli.effects.optics.field_blur import FieldBlur, ZoneWeight
+from vcam_cli.effects.optics.field_blur import TYPICAL_CHANGE, FieldBlur, ZoneWeight
 from vcam_cli.effects.optics.point_spread import PointSpread
 from vcam_cli.effects.optics.wavefront_blur import DirectedBlur, Lens, SymmetricBlur
 from vcam_cli.errors import BadInput
@@ -218,7 +218,8 @@ def test_weights_keep_the_type_of_their_places():
 @given(st.integers(2, 7), st.floats(-math.pi, math.pi), st.floats(0, 1))
 def test_weights_follow_polynomials_and_waves(count, angle, distance):
     """Exactly, up to a power of the distance and a multiple of the azimuth that count allows."""
-    zones = FieldBlur(WAVES, ((0.0, ()), (1.0, ((8, 1e-9),))), 1e-3).zones(count)
+    change = TYPICAL_CHANGE * GREEN  # of which `count` places are taken
+    zones = FieldBlur(WAVES, ((0.0, ()), (1.0, ((8, change),))), 1e-3).zones(count)
     x, y = (np.array([1e-3 * distance * part]) for part in (math.cos(angle), math.sin(angle)))
 
     def known(zone):

@@ -32,12 +32,12 @@ from vcam_cli.effects.optics.wavefront_blur import (
 from vcam_cli.physics import zernike
 from vcam_cli.physics.zernike import Terms
 
-PLACES_PER_WAVE = 6.0
-"""Further places for each wave (rms) that the wavefront changes by from center to corner: the
-transfer function turns by some radians then, and a polynomial needs a degree for each."""
+TYPICAL_CHANGE = 0.1
+"""Change of a wavefront from center to corner [waves rms] for which the settings' number of places
+is meant. Of other changes as many places are taken as err as little: see `places_needed`."""
 MAX_PLACES = 13
-"""Number of places at which that ends: of a wavefront of more waves what lies between two zones is
-known less well."""
+"""Number of places on a stretch at which that ends: of a wavefront of more waves what lies between
+two zones is known less well."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class FieldBlur(AberrationBlur, FieldTransfer):
     def rings(self, count: int) -> tuple[Zone, ...]:
         """Return `count` places from center to corner, or more, whose weights sum to 1.
 
-        Places are added for every wave by which the wavefront changes, up to `MAX_PLACES`.
+        Each stretch on which the wavefront changes evenly has places of its own.
         """
         kind = DirectedBlur if self._azimuthal_order else SymmetricBlur
         found = self._rings(count)
@@ -127,7 +127,8 @@ class FieldBlur(AberrationBlur, FieldTransfer):
         if not self._azimuthal_order:
             return self.rings(count)
         # As many harmonics around as powers outwards; a multiple of 4 has its quarter turns.
-        around = 4 * math.ceil((2 * self._azimuthal_order * (self._enough(count) - 1) + 1) / 4)
+        most = max(map(len, self._stretches(count)))
+        around = 4 * math.ceil((2 * self._azimuthal_order * (most - 1) + 1) / 4)
         return tuple(
             Zone(
                 DirectedBlur(self.lens, terms, self.focus, angle=2 * math.pi * sector / around),
@@ -139,16 +140,11 @@ class FieldBlur(AberrationBlur, FieldTransfer):
 
     def _rings(self, count: int) -> tuple[tuple[Terms, ZoneWeight], ...]:
         """Return the wavefront and the weight of each place on the half-axis, rising."""
-        stretches = self._stretches(self._enough(count))
+        stretches = self._stretches(count)
         return tuple(
             (self.wavefront(place), ZoneWeight(stretches, place, 0, 0, self.half_diagonal))
             for place in sorted({place for nodes in stretches for place in nodes})
         )
-
-    def _enough(self, count: int) -> int:
-        """Return the number of places, `count` or more."""
-        waves = sum(change for _, _, change in self._changes) / GREEN
-        return max(count, min(count + math.ceil(PLACES_PER_WAVE * waves), MAX_PLACES))
 
     @property
     def _azimuthal_order(self) -> int:
@@ -169,13 +165,11 @@ class FieldBlur(AberrationBlur, FieldTransfer):
     def _stretches(self, count: int) -> tuple[tuple[float, ...], ...]:
         """Return places in each stretch on which the wavefront changes evenly, with its ends.
 
-        They are Chebyshev points, between which polynomials err least; there are most of them
-        where the wavefront changes most.
+        They are Chebyshev points, between which polynomials err least.
         """
-        total = sum(change for _, _, change in self._changes) or 1.0
         found = []
         for low, high, change in self._changes:
-            steps = 1 + math.ceil((max(count, 2) - 2) * change / total - 1e-9)
+            steps = places_needed(change / GREEN, count) - 1
             at = (1 - np.cos(np.pi * np.arange(steps + 1) / steps)) / 2
             inner = (low + (high - low) * at[1:-1]).tolist()
             found.append((low, *inner, high))
@@ -185,6 +179,33 @@ class FieldBlur(AberrationBlur, FieldTransfer):
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         # Wavefronts change evenly in between: none is worse than that of one of its ends.
         return max(self._blur(place).mean_error(signal) for place in self._ends)
+
+
+def places_needed(change: float, count: int) -> int:
+    """Return the places between which an even change of the wavefront is interpolated well enough.
+
+    Along a stretch the transfer function turns like exp(i t theta), t from 0 to 1, by about twice
+    the phase of the change. A polynomial through n Chebyshev points errs by 2 (theta / 4)^n / n!.
+
+    Parameters
+    ----------
+    change : float
+        Change of the wavefront along the stretch [waves rms].
+    count : int
+        Number of places whose error for a change of `TYPICAL_CHANGE` is allowed.
+
+    Returns
+    -------
+    int
+        Number of places, 2 to the larger of `MAX_PLACES` and `count`.
+    """
+
+    def error(waves: float, places: int) -> float:
+        return (math.pi * waves) ** places / math.factorial(places)
+
+    count = max(count, 2)
+    most, allowed = max(MAX_PLACES, count), error(TYPICAL_CHANGE, count)
+    return next((n for n in range(2, most) if error(change, n) <= allowed), most)
 
 
 @dataclass(frozen=True)
