@@ -117,8 +117,10 @@ def photo_rate(path: OpticalPath, scene: AnyScene, planes: bool = False) -> Rate
     while True:
         found = _gathered(path, scene, planes)
         full = min(float(found.values.max(initial=0.0)), path.ceiling)
-        # Skipped effects err below the frequencies that are lost: their squares add.
-        error = math.hypot(found.spectrum.lost_rms, plan.share * full)
+        # Skipped effects err below the frequencies that are lost: their squares add. Few pixels may
+        # lose more than all places do on average.
+        lost = found.spectrum.lost_rms * math.sqrt(path.scatter)
+        error = math.hypot(lost, plan.share * full)
         if full >= path.full or error <= USED_SHARE * path.settings.tolerance * full:
             return replace(found, plan=plan)
         path = replace(path, full=full)
