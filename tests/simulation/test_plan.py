@@ -239,6 +239,18 @@ def test_promise_of_the_variance(name, scope, run):
         assert abs(found - expected) <= 2 * auto.frame.camera.accuracy.tolerance * expected
 
 
+@pytest.mark.parametrize("kind", ["voltage", "digital", "charge"])
+def test_noise_is_weighed_at_levels_of_the_raw_frame(kind, tmp_path):
+    """A bright row is a quarter of each pixel that four make, and many more of those have some."""
+    star = {"kind": "chart", "chart": "siemens-star", "spokes": 3}
+    binning = {"rows": 4, "columns": 1, "kind": kind}
+    changes = {"scene.source": star, "array.rows": 24, "array.columns": 6, "array.binning": binning}
+    result = simulate(camera(tmp_path, changes))
+    read_as_one = 4 if kind == "digital" else 1
+    expected = scene_levels(result) / read_as_one
+    np.testing.assert_allclose(result.frame.plan.levels, expected, rtol=1e-6)
+
+
 def test_the_cameras_put_the_promises_to_the_test(run):
     """What the plan may leave out it leaves out of one camera, and keeps in another.
 
