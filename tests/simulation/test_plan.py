@@ -239,15 +239,23 @@ def test_promise_of_the_variance(name, scope, run):
         assert abs(found - expected) <= 2 * auto.frame.camera.accuracy.tolerance * expected
 
 
-@pytest.mark.parametrize("kind", ["voltage", "digital", "charge"])
+@pytest.mark.parametrize("kind", ["voltage", "digital", "charge", "honeycomb", "stacked"])
 def test_noise_is_weighed_at_levels_of_the_raw_frame(kind, tmp_path):
-    """A bright row is a quarter of each pixel that four make, and many more of those have some."""
+    """Joined pixels have the mean of their light; of a honeycomb every row has its colors."""
     star = {"kind": "chart", "chart": "siemens-star", "spokes": 3}
-    binning = {"rows": 4, "columns": 1, "kind": kind}
-    changes = {"scene.source": star, "array.rows": 24, "array.columns": 6, "array.binning": binning}
+    changes = {"scene.source": star, "array.rows": 24, "array.columns": 6}
+    if kind in ("honeycomb", "stacked"):
+        changes |= PATCHES | BAYER | {"array.pattern": kind, "output.render": "none"}
+    else:
+        changes["array.binning"] = {"rows": 4, "columns": 1, "kind": kind}
     result = simulate(camera(tmp_path, changes))
-    read_as_one = 4 if kind == "digital" else 1
-    expected = scene_levels(result) / read_as_one
+    if kind == "stacked":
+        found = [
+            np.percentile(plane, PERCENTILES) for plane in np.moveaxis(result.mean_electrons, -1, 0)
+        ]
+        expected = np.concatenate(found)
+    else:
+        expected = scene_levels(result) / (4 if kind == "digital" else 1)
     np.testing.assert_allclose(result.frame.plan.levels, expected, rtol=1e-6)
 
 

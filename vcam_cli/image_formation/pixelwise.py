@@ -6,7 +6,7 @@ thousand pixels, what each of them changes.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -126,27 +126,32 @@ def changes_by_omission(
     }
 
 
-def percentiles(rate: Array, mosaic: Mosaic, shares: Sequence[float]) -> Array:
+def percentiles(
+    signal: Array, colors: Callable[[slice, slice], Array] | None, shares: Sequence[float]
+) -> Array:
     """Return percentiles of a signal in every color, from every n-th row and column.
 
     Parameters
     ----------
-    rate : Array
-        Signal (rows, columns), anything where the mosaic has no pixel [e/s].
-    mosaic : Mosaic
-        Colors of the pixels.
+    signal : Array
+        Signal (rows, columns), in any unit.
+    colors : callable or None
+        Function that returns the indices of the pixels' colors in some rows and columns; None of
+        pixels of one color.
     shares : sequence of float
         Percentages.
 
     Returns
     -------
     Array
-        Percentiles (colors, shares) [e/s].
+        Percentiles (colors, shares), in the unit of the signal.
     """
-    rows, columns = (_every_nth(count, rate.shape) for count in rate.shape)
-    some = rate[rows, columns]
-    colors = _colors(mosaic, np.arange(rate.shape[0])[rows], np.arange(rate.shape[1])[columns])
-    return np.array([np.percentile(some[pixels], shares) for pixels in colors if pixels.any()])
+    some = tuple(_every_nth(count, signal.shape) for count in signal.shape)
+    kept = signal[some]
+    if colors is None:
+        return np.percentile(kept, shares)[None]
+    color = colors(*some)
+    return np.array([np.percentile(kept[color == one], shares) for one in np.unique(color)])
 
 
 def _clip(signal: Array, limits: Iterable[Limit]) -> Array:

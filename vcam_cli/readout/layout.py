@@ -161,6 +161,26 @@ class Layout:
                     out[row::period, part] = color
         return self.select_pixels(out)
 
+    def color_at(self, rows: slice, columns: slice) -> Array:
+        """Return the indices of the colors of some pixels of the raw frame.
+
+        Parameters
+        ----------
+        rows, columns : slice
+            Rows and columns of the frame.
+
+        Returns
+        -------
+        Array
+            Indices (rows, columns).
+        """
+        if self.is_scattered:
+            return self.color[rows, columns]
+        mosaic, count = self.raw_mosaic, self.geometry
+        block = np.array([[mosaic.colors.index(c) for c in line] for line in mosaic.block])
+        down, along = np.arange(count.rows)[rows], np.arange(count.columns)[columns]
+        return block[np.ix_(down % block.shape[0], along % block.shape[1])]
+
     @property
     def picture_shape(self) -> tuple[int, int]:
         """Rows and columns of the picture."""

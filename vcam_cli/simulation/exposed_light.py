@@ -189,14 +189,13 @@ def _levels(
 
     They are those of the raw frame: means of pixels that are read as one.
     """
-    mosaic, planes, groups = layout.raw_mosaic, rate.ndim == 3, layout.binning_groups
+    groups = layout.binning_groups
     if groups.summed_charges == 1:  # else the nodes are the pixels of the raw frame already
         rate = groups.sums(rate) / rate.dtype.type(groups.count)
-    mosaics = [Mosaic(((color,),)) for color in mosaic.colors] if planes else [mosaic]
-    levels = [
-        pixelwise.percentiles(plane, colors, PERCENTILES)
-        for plane, colors in zip(rate if planes else [rate], mosaics, strict=True)
-    ]
+    if rate.ndim == 3:
+        levels = [pixelwise.percentiles(plane, None, PERCENTILES) for plane in rate]
+    else:
+        levels = [pixelwise.percentiles(rate, layout.color_at, PERCENTILES)]
     signal = (np.concatenate(levels).astype(float) + dark) * time
     return tuple(np.minimum(signal, well).ravel().tolist())
 
