@@ -23,7 +23,7 @@ from vcam_cli.image_formation.warps import covered
 from vcam_cli.quality import scielab
 from vcam_cli.quality.display import display_screen
 from vcam_cli.readout import auto_exposure, exposure
-from vcam_cli.scenes.base import ChartScene, HarmonicScene
+from vcam_cli.scenes.base import ChartScene, HarmonicScene, SampledScene
 from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.image import ImageScene
 from vcam_cli.scenes.layered import AnyScene, LayeredScene
@@ -243,7 +243,7 @@ def _widened(seen: SceneLight, picture: ScenePicture, light: photon_rate.Rate) -
     Layers predict themselves what their margins change.
     """
     around, time = _rate_around(seen), seen.solved.exposure.time
-    if around == 0 or isinstance(seen.scene, DepthScene | LayeredScene):
+    if around == 0 or not isinstance(seen.scene, SampledScene):
         return seen
     full = min(float(light.values.max(initial=0.0)), seen.path.ceiling)
     full = max(full, 1 / time if time else 0.0)  # as defined, at least one electron
@@ -251,7 +251,7 @@ def _widened(seen: SceneLight, picture: ScenePicture, light: photon_rate.Rate) -
     if overexposure <= DARKER * seen.overexposure:
         return seen
     scene = _scene(seen.solved, picture, seen.path.effects, overexposure)
-    if scene.shape == seen.scene.shape:
+    if not isinstance(scene, SampledScene) or scene.shape == seen.scene.shape:
         return seen
     key = f"{seen.light_key} {scene.shape}"
     return replace(seen, scene=scene, light_key=key, overexposure=overexposure)
