@@ -13,7 +13,7 @@ from vcam_cli.devices.processor import Processor
 
 FUNCTIONS = {
     *("clip", "concatenate", "copyto", "empty_like", "moveaxis", "partition", "prod", "ravel"),
-    *("take", "where", "zeros_like", "mean", "ndim", "broadcast_arrays"),
+    *("take", "where", "zeros_like", "mean", "ndim", "broadcast_arrays", "outer"),
 }
 """Functions of NumPy that a device's arrays may meet: CuPy has all of them."""
 
@@ -60,6 +60,8 @@ class FakeArray(NDArrayOperatorsMixin):
     def __getattr__(self, name: str) -> Any:
         if name in ("dtype", "shape", "ndim", "size", "nbytes"):
             return getattr(self.values, name)
+        if name in ("T", "real", "imag"):
+            return FakeArray(getattr(self.values, name))
         if name in ("astype", "reshape", "sum", "mean", "min", "max", "ravel", "copy"):
             method = getattr(self.values, name)
             return lambda *args, **kwargs: _fake(method(*_own(args), **kwargs))
@@ -86,6 +88,7 @@ class FakeArray(NDArrayOperatorsMixin):
 
 class FakeDevice(Processor):
     name = "fake"
+    whole = True
 
     def describe(self):
         return self.name
@@ -99,6 +102,21 @@ class FakeDevice(Processor):
 
     def zeros(self, shape, dtype):
         return FakeArray(super().zeros(shape, dtype))
+
+    def dct3(self, values, axis, odd, overwrite=False):
+        return FakeArray(super().dct3(values.values, axis, odd))
+
+    def fft(self, values, axis):
+        return FakeArray(super().fft(values.values, axis))
+
+    def ifft(self, values, axis):
+        return FakeArray(super().ifft(values.values, axis))
+
+    def splines(self, values):
+        return FakeArray(super().splines(values.values))
+
+    def interpolated(self, coefficients, row, column):
+        return FakeArray(super().interpolated(*(a.values for a in (coefficients, row, column))))
 
     def normals(self, keys, name, sample, count, dtype):
         return FakeArray(super().normals(keys.values, name, sample, count, dtype))

@@ -13,7 +13,7 @@ from numpy.typing import DTypeLike
 
 from vcam_cli.arrays import Array
 from vcam_cli.devices import counter_noise
-from vcam_cli.devices.processor import SHARE, Processor
+from vcam_cli.devices.processor import SHARE, SPLINES, Processor
 from vcam_cli.errors import CannotDo
 
 THREADS, MOST_BLOCKS = 256, 1 << 16
@@ -30,6 +30,7 @@ class Cuda(Processor):
     """The current graphics processor."""
 
     name: ClassVar[str] = "gpu"
+    whole: ClassVar[bool] = True
 
     def __init__(self, cupy: Any) -> None:
         self._cupy = cupy
@@ -83,6 +84,48 @@ class Cuda(Processor):
         """Return an array of zeros on the device."""
         array: Array = self._cupy.zeros(shape, dtype)
         return array
+
+    def dct3(self, values: Array, axis: int, odd: bool, overwrite: bool = False) -> Array:
+        """Return the DCT-III along an axis, of sines the DST-III."""
+        from cupyx.scipy import fft  # type: ignore[import-not-found]
+
+        transform = fft.dst if odd else fft.dct
+        found: Array = transform(values, type=3, axis=axis, overwrite_x=overwrite)
+        return found
+
+    def fft(self, values: Array, axis: int) -> Array:
+        """Return the Fourier transform of complex numbers along an axis."""
+        found: Array = self._cupy.fft.fft(values, axis=axis)
+        return found
+
+    def ifft(self, values: Array, axis: int) -> Array:
+        """Return the inverse of `fft`."""
+        found: Array = self._cupy.fft.ifft(values, axis=axis)
+        return found
+
+    def splines(self, values: Array) -> Array:
+        """Return the coefficients of splines through an image that is mirrored."""
+        from cupyx.scipy import ndimage
+
+        found: Array = ndimage.spline_filter(
+            values, order=SPLINES, output=values.dtype, mode="mirror"
+        )
+        return found
+
+    def interpolated(self, coefficients: Array, row: Array, column: Array) -> Array:
+        """Return the image of `splines` between its samples."""
+        from cupyx.scipy import ndimage
+
+        places = self._cupy.stack([row, column])
+        found: Array = ndimage.map_coordinates(
+            coefficients,
+            places,
+            order=SPLINES,
+            prefilter=False,
+            mode="mirror",
+            output=coefficients.dtype,
+        )
+        return found
 
     def free_memory(self) -> int:
         """Return the memory that batches may take: a share of the free, kept pools included."""

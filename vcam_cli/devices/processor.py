@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Final
 
 import numpy as np
 import scipy.fft
@@ -21,6 +21,8 @@ from vcam_cli.arrays import Array
 from vcam_cli.devices import counter_noise
 from vcam_cli.errors import CannotDo
 
+SPLINES: Final = 5
+"""Order of the splines through an image."""
 SHARE = 0.8
 """Part of the free memory of a device that batches may take."""
 
@@ -29,10 +31,22 @@ class Processor:
     """The processor of this machine, with NumPy's arrays."""
 
     name: ClassVar[str] = "cpu"
+    whole: ClassVar[bool] = False
+    """Whether arrays are computed whole, in one thread, and not in pieces for caches and threads."""
 
     def describe(self) -> str:
         """Return the device and its library, for `run.json`."""
         return f"cpu, NumPy {np.__version__}"
+
+    @property
+    def label(self) -> str:
+        """Return what records say of results: "cpu", or the device and its library."""
+        return self.describe() if self.whole else self.name
+
+    @property
+    def key(self) -> str:
+        """Return what tells results of this device from those of others; "" of the processor."""
+        return f" {self.name}" if self.whole else ""
 
     def put(self, values: Any, dtype: DTypeLike | None = None) -> Array:
         """Return values of the processor as an array of the device.
@@ -135,6 +149,48 @@ class Processor:
         found: Array = np.clip(level, 0, highest, out=level)
         return found if dtype is None else found.astype(dtype)
 
+    def dct3(self, values: Array, axis: int, odd: bool, overwrite: bool = False) -> Array:
+        """Return the DCT-III along an axis, of sines (`odd`) the DST-III, unnormalized.
+
+        It may reuse the array (`overwrite`).
+        """
+        transform = scipy.fft.dst if odd else scipy.fft.dct
+        found: Array = transform(values, type=3, axis=axis, overwrite_x=overwrite)
+        return found
+
+    def fft(self, values: Array, axis: int) -> Array:
+        """Return the Fourier transform of complex numbers along an axis, in their array."""
+        found: Array = scipy.fft.fft(values, axis=axis, overwrite_x=True)
+        return found
+
+    def ifft(self, values: Array, axis: int) -> Array:
+        """Return the inverse of `fft`, in the array of the values."""
+        found: Array = scipy.fft.ifft(values, axis=axis, overwrite_x=True)
+        return found
+
+    def splines(self, values: Array) -> Array:
+        """Return the coefficients (rows, columns) of splines through an image that is mirrored."""
+        from scipy import ndimage
+
+        found: Array = ndimage.spline_filter(
+            values, order=SPLINES, output=values.dtype, mode="mirror"
+        )
+        return found
+
+    def interpolated(self, coefficients: Array, row: Array, column: Array) -> Array:
+        """Return the image of `splines` at rows and columns of one shape, between its samples."""
+        from scipy import ndimage
+
+        found: Array = ndimage.map_coordinates(
+            coefficients,
+            [row, column],
+            order=SPLINES,
+            prefilter=False,
+            mode="mirror",
+            output=coefficients.dtype,
+        )
+        return found
+
     def stacked(self, pictures: Sequence[Any]) -> Array:
         """Return pictures of one shape as one array (n, ...) of the device."""
         return self.put(np.stack([np.asarray(picture) for picture in pictures]))
@@ -225,6 +281,10 @@ class Processor:
             return whole
         found: Array = np.take_along_axis(whole, color[None, None], axis=1)[:, 0]
         return np.maximum(found, 0, out=found)
+
+
+PROCESSOR = Processor()
+"""The processor, where nothing else is asked for."""
 
 
 def require(device: Processor, needed: int, what: str) -> None:

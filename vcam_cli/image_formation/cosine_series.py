@@ -31,6 +31,7 @@ import numpy as np
 import scipy.fft
 
 from vcam_cli.arrays import Array
+from vcam_cli.devices.processor import PROCESSOR, Processor
 
 NEAR = 1e-7
 """Distances below this are rounding errors [pixel pitches]."""
@@ -55,6 +56,8 @@ class Axis:
     """Highest spatial frequency kept [cycles/m]."""
     row_shifts: Array | None = None
     """Displacement of the photodetectors of every row (rows,), where it is not the same [m]."""
+    device: Processor = PROCESSOR
+    """Where the arrays of terms lie that are folded and evaluated."""
 
     @property
     def length(self) -> float:
@@ -172,7 +175,7 @@ class Axis:
         """
         if terms <= coefficients.shape[-1]:
             return coefficients[..., :terms]
-        out = np.empty((*coefficients.shape[:-1], terms), coefficients.dtype)
+        out = np.empty_like(coefficients, shape=(*coefficients.shape[:-1], terms))
         for source, target, sign in segments(self.samples, terms):
             np.multiply(coefficients[..., source], sign, out=out[..., target])
         out[..., self.samples :: 2 * self.samples] = 0
@@ -232,7 +235,7 @@ class Axis:
         """
         n = terms.shape[-1]
         if self.virtual_pixels is None:
-            out = np.zeros((*terms.shape[:-1], self.terms), terms.dtype)
+            out = self.device.zeros((*terms.shape[:-1], self.terms), terms.dtype)
             out[..., :n] = terms
             return out
         parts, constant = segments(self.virtual_pixels, n, odd), terms[..., 0].copy()
@@ -240,7 +243,7 @@ class Axis:
             out = terms[..., : self.virtual_pixels]  # the first part is where it belongs
             parts = parts[1:]
         else:
-            out = np.zeros((*terms.shape[:-1], self.virtual_pixels), terms.dtype)
+            out = self.device.zeros((*terms.shape[:-1], self.virtual_pixels), terms.dtype)
         for target, source, sign in parts:
             if sign > 0:
                 out[..., target] += terms[..., source]
@@ -293,8 +296,7 @@ class Axis:
         """
         if self.window is None:
             return self._chirp(values, axis, odd)
-        transform = scipy.fft.dst if odd else scipy.fft.dct
-        full = transform(values, type=3, axis=axis, overwrite_x=overwrite)
+        full = self.device.dct3(values, axis, odd, overwrite)
         return full[self.window] if axis == 0 else full[:, self.window]
 
     @cached_property
@@ -320,14 +322,17 @@ class Axis:
         shape = (-1, 1) if axis == 0 else (1, -1)
         count, padded = values.shape[axis], list(values.shape)
         padded[axis] = size
-        work: Array = np.zeros(padded, kind)
+        work = self.device.zeros(tuple(padded), kind)
+        before, kernel, after = (
+            self.device.put(part, kind).reshape(shape) for part in (before, kernel, after)
+        )
         inside = work[:count] if axis == 0 else work[:, :count]
-        np.multiply(values, np.asarray(before, kind).reshape(shape), out=inside)
-        work = scipy.fft.fft(work, axis=axis, overwrite_x=True)
-        work *= kernel.astype(kind).reshape(shape)
-        work = scipy.fft.ifft(work, axis=axis, overwrite_x=True)
+        np.multiply(values, before, out=inside)
+        work = self.device.fft(work, axis)
+        work *= kernel
+        work = self.device.ifft(work, axis)
         work = work[: self.pixels] if axis == 0 else work[:, : self.pixels]
-        work *= after.astype(kind).reshape(shape)
+        work *= after
         return work.imag if odd else work.real
 
 

@@ -411,4 +411,8 @@ def filtered_layers(
     for mode in (None, *modes):
         chosen = image_filter if mode is None else replace(image_filter, tables=mode.tables())
         series = chosen.apply(spectrum, workers)
-        yield Layer(series.signal, None if mode is None else mode.map)
+        values = series.signal
+        if chosen.x.device.whole:
+            planes = series.on_processor()
+            values = lambda color, rows, planes=planes: planes[color][rows]  # noqa: E731
+        yield Layer(values, None if mode is None else mode.map)

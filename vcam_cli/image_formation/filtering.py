@@ -16,6 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.devices.processor import Processor
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.scene_spectrum import SceneSpectrum
 from vcam_cli.image_formation.transfer_tables import PARITIES, TableReader, Tables, reader
@@ -67,12 +68,17 @@ class Series:
         found = [self.x.evaluate(part, axis=1, odd=odd) for odd, part in parts.items()]
         return found[0] if len(found) == 1 else found[0] + found[1]
 
+    def on_processor(self) -> list[Array]:
+        """Return the signal of every color at all photodetectors, copied to the processor."""
+        colors = range(len(next(iter(self.parts.values()))))
+        return [self.x.device.get(self.signal(color, slice(None))) for color in colors]
+
     def _shift_rows(self, parts: dict[bool, Array], shifts: Array) -> dict[bool, Array]:
         """Return the waves of rows as photodetectors see them that are displaced by `shifts` [m].
 
         cos(a + b) = cos a cos b - sin a sin b, sin(a + b) = sin a cos b + cos a sin b.
         """
-        angle = 2 * np.pi * np.outer(shifts, self.x.frequencies)
+        angle = 2 * np.pi * np.outer(*map(self.x.device.put, (shifts, self.x.frequencies)))
         some = next(iter(parts.values()))
         cosine, sine = np.cos(angle).astype(some.dtype), np.sin(angle).astype(some.dtype)
         even, odd = (parts.get(kind, np.zeros_like(some)) for kind in (False, True))
@@ -147,6 +153,14 @@ class Filter:
                 parts[waves[0]] = found
         return Series(self.x, parts)
 
+    def on(self, device: Processor) -> Filter:
+        """Return the same filter for spectra on a device."""
+        return replace(self, x=replace(self.x, device=device), y=replace(self.y, device=device))
+
+    @property
+    def _device(self) -> Processor:
+        return self.x.device
+
     @property
     def terms(self) -> int:
         """Number of terms of a plane's spectrum that are filtered."""
@@ -204,8 +218,9 @@ class Filter:
         for wave_y, share_y in self.y.pixel_waves(odd_y):
             targets = []
             for wave_x, share_x in self.x.pixel_waves(odd_x):
-                sums = folded.setdefault((wave_x, wave_y), np.zeros(shape, dtype))
-                targets.append((sums, wave_x, None if share_x is None else share_x.astype(dtype)))
+                sums = folded.setdefault((wave_x, wave_y), self._device.zeros(shape, dtype))
+                share = None if share_x is None else self._device.put(share_x, dtype)
+                targets.append((sums, wave_x, share))
 
             def multiply(
                 rows: slice,
@@ -223,7 +238,8 @@ class Filter:
                             last = sums is targets[-1][0]
                             sums[colors, here] += self.x.fold(some, wave_x, overwrite=last)
 
-            each(multiply, pieces(self.y.folded_terms, LONGEST), workers)
+            threads = 1 if self._device.whole else workers
+            each(multiply, pieces(self.y.folded_terms, LONGEST), threads)
 
     def _filter_rows(
         self, spectrum: SceneSpectrum, table: TableReader, terms: Array, weights: Array
@@ -232,7 +248,7 @@ class Filter:
 
         `terms` (n,) are consecutive rows, rising or falling; `weights` are factors on them.
         """
-        dtype = spectrum.dtype
+        dtype, device = spectrum.dtype, self._device
         factor = self._weights_x
         below = weights * self.y.coefficient_index(terms)[1] * self.y.weights[terms]
         below = below * self.along_y[terms]
@@ -242,12 +258,13 @@ class Filter:
             if not count:
                 continue
             nodes, shares = chebyshev(fy) if len(fy) >= SHORTEST else (fy, np.eye(len(fy)))
-            shares = (shares * below[stretch, None]).astype(dtype)
-            values = (table.values(nodes, count) * factor[:count]).astype(dtype)
-            for rows in slices_within(stretch, rows_at_once(count)):
+            shares = device.put(shares * below[stretch, None], dtype)
+            values = device.put(table.values(nodes, count) * factor[:count], dtype)
+            longest = LONGEST if device.whole else rows_at_once(count)
+            for rows in slices_within(stretch, longest):
                 planes = self._rows(spectrum, terms[rows], count)
                 at = slice(rows.start - stretch.start, rows.stop - stretch.start)
-                few = (rows.stop - rows.start) * count <= FEW
+                few = device.whole or (rows.stop - rows.start) * count <= FEW
                 for colors in pieces(self.tables.colors, self.tables.colors if few else 1):
                     total: Array | None = None
                     for plane, of_plane in zip(planes, values[:, colors], strict=True):
@@ -282,6 +299,8 @@ class Filter:
     def _rows(self, spectrum: SceneSpectrum, terms: Array, count: int) -> list[Array]:
         """Return rows of every plane's spectrum without factors: R of (n, count)."""
         index = _consecutive(self.y.coefficient_index(terms)[0])
+        if not isinstance(index, slice):
+            index = self._device.put(index)
         planes = range(len(spectrum))
         return [self.x.extend(spectrum.rows(plane, index, count), count) for plane in planes]
 
@@ -304,15 +323,16 @@ class Filter:
         out = folded
         if window is None:
             shape = (len(folded), self.y.pixels, self.x.folded_terms)
-            out = np.empty(shape, folded.dtype)
-        columns = pieces(self.x.folded_terms, rows_at_once(self.y.transform))
+            out = np.empty_like(folded, shape=shape)
+        some = self.x.folded_terms if self._device.whole else rows_at_once(self.y.transform)
+        columns, threads = pieces(self.x.folded_terms, some), 1 if self._device.whole else workers
 
         def evaluate(task: tuple[int, slice]) -> None:
             color, s = task
             found = self.y.evaluate(folded[color, :, s], axis=0, odd=odd)
             (out[color] if window is None else out[color, window])[:, s] = found
 
-        each(evaluate, [(c, s) for c in range(len(folded)) for s in columns], workers)
+        each(evaluate, [(c, s) for c in range(len(folded)) for s in columns], threads)
         return out if window is None else out[:, window]
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.mosaic import Mosaic
+from vcam_cli.devices.processor import PROCESSOR, Processor
 from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.blurs import FieldTransfer, SeparableTransfer, Zone
 from vcam_cli.effects.warps import ImageMotion
@@ -69,6 +70,8 @@ class OpticalPath:
     mosaic: Mosaic
     effects: tuple[Effect, ...]
     workers: int
+    device: Processor = PROCESSOR
+    """Where sampled scenes are transformed, filtered and evaluated at the pixels."""
     ceiling: float = np.inf
     """Rate that fills a pixel by the end of the exposure, inf where unknown; brighter ones all
     look alike [e/s]."""
@@ -291,9 +294,17 @@ class SpectrumReport:
     """Bound on the signal before blur: a ceiling above it changes nothing [electrons / s]."""
     memory: int = 0
     """Estimated memory [bytes]."""
+    device: str = "cpu"
+    """Where samples were transformed, filtered and evaluated; all else is the processor's."""
     depth: DepthReport | None = None
     """How layers were put one before the other; None of a flat scene."""
     cut: CutReport | None = None
     """How a picture with depth was cut into layers; None of other scenes."""
     parts: tuple[tuple[Geometry, int, SpectrumReport], ...] = ()
     """Of each layer: its cells as if they were pixels, colors of light and opacity, its report."""
+
+    @property
+    def computed_on(self) -> str:
+        """Device that transformed, filtered and evaluated samples of the scene, or of a layer."""
+        every = [self.device, *(own.computed_on for *_, own in self.parts)]
+        return next((device for device in every if device != "cpu"), "cpu")

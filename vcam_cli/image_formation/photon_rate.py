@@ -115,7 +115,8 @@ def photo_rate(path: OpticalPath, scene: AnyScene, planes: bool = False) -> Rate
     plan = light_plan(path, scene)
     path = plan.reduced(path)
     while True:
-        found = _gathered(path, scene, planes)
+        with path.device.errors():
+            found = _gathered(path, scene, planes)
         full = min(float(found.values.max(initial=0.0)), path.ceiling)
         # Skipped effects err below the frequencies that are lost: their squares add. Few pixels may
         # lose more than all places do on average.

@@ -5,19 +5,24 @@ Planes of samples are transformed; charts in closed form are not sampled (`close
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement
 from typing import Protocol
 
 import numpy as np
 import scipy.fft
+from numpy.typing import DTypeLike
 
 from vcam_cli.arrays import Array
+from vcam_cli.devices.processor import Processor
 from vcam_cli.parallel import each, pieces, rows_at_once, slices_within
-from vcam_cli.scenes.bands import bands_of_rows
+from vcam_cli.scenes.bands import bands_of_rows, paint_by_bands
 from vcam_cli.scenes.base import ChartScene
 
 Index = Array | slice
+COPIED = 1 << 23
+"""Values of a plane that are copied to a device together."""
 
 
 class SceneSpectrum(Protocol):
@@ -149,6 +154,23 @@ class SampledSpectrum:
         return out
 
 
+@dataclass(frozen=True, eq=False)
+class DeviceSpectrum(SampledSpectrum):
+    """The spectrum of planes of samples, on a device."""
+
+    device: Processor
+
+    def _pair_products(self, pair: tuple[int, int], y: Array, x: Array, workers: int) -> Array:
+        first, second = (self.coefficients[plane, : y[-1], : x[-1]] for plane in pair)
+        members = [
+            self.device.put(np.repeat(np.eye(len(edges) - 1), np.diff(edges), axis=0), self.dtype)
+            for edges in (y, x)
+        ]
+        along_x = np.matmul(first * second, members[1])
+        sums = np.matmul(members[0].T, along_x)
+        return self.device.get(sums).astype(np.float64)
+
+
 def _block_groups(edges: Array, longest: int) -> list[slice]:
     """Return neighboring blocks of terms, together at most `longest` or one block alone."""
     out, start = [], 0
@@ -186,6 +208,109 @@ def transform_planes(planes: Array, workers: int) -> SampledSpectrum:
         each(along_rows, pieces(rows, rows_at_once(columns)), workers)
         _transform_columns(plane, rows, workers)
     return SampledSpectrum(planes)
+
+
+def transform_on(device: Processor, planes: Array, terms: tuple[int, int]) -> DeviceSpectrum:
+    """Return the first terms of the DCT-II of planes, computed on a device.
+
+    Parameters
+    ----------
+    device : Processor
+        The device.
+    planes : Array
+        Samples (R, ny, nx), on the device.
+    terms : tuple of int
+        Number of terms along y and x.
+
+    Returns
+    -------
+    DeviceSpectrum
+        Coefficients, unnormalized.
+    """
+    alone = device.put(np.ones((1, 1)), planes.dtype)
+    shape = planes.shape[1], planes.shape[2]
+    found = device.spectrum(planes[..., None], alone, shape, (0, 0))
+    return DeviceSpectrum(found[:, 0, : terms[0], : terms[1]], device)
+
+
+def painted_on(
+    device: Processor, scene: ChartScene, mix: Array, workers: int
+) -> tuple[Array, Array]:
+    """Return the planes of a chart on a device, painted by the processor band by band.
+
+    Parameters
+    ----------
+    device : Processor
+        The device.
+    scene : ChartScene
+        The chart on its cells.
+    mix : Array
+        Mixtures (R, K) of the scene's components.
+    workers : int
+        Number of threads.
+
+    Returns
+    -------
+    planes : Array
+        Averages over the cells (R, ny, nx), on the device.
+    brightest : Array
+        Largest absolute value of every plane (R,).
+    """
+    paint, brightest = scene.painter(mix), list[Array]()
+
+    def fill(rows: slice, out: Array) -> None:
+        def some(part: slice) -> None:
+            paint(slice(rows.start + part.start, rows.start + part.stop), out[:, part])
+
+        paint_by_bands(some, *out.shape[1:], workers)
+        brightest.append(np.maximum(out.max(axis=(1, 2)), -out.min(axis=(1, 2))))
+
+    planes = _in_bands(device, (len(mix), *scene.shape), scene.dtype, fill)
+    return planes, np.max(brightest, axis=0)
+
+
+def copied_to(
+    device: Processor, spectrum: SceneSpectrum, terms: tuple[int, int], workers: int
+) -> DeviceSpectrum:
+    """Return the first terms of a spectrum in closed form, copied to a device.
+
+    Parameters
+    ----------
+    device : Processor
+        The device.
+    spectrum : SceneSpectrum
+        Spectrum of R planes, computed by the processor.
+    terms : tuple of int
+        Number of terms along y and x.
+    workers : int
+        Number of threads.
+    """
+
+    def fill(rows: slice, out: Array) -> None:
+        def some(part: slice) -> None:
+            for plane, own in enumerate(out):
+                index = slice(rows.start + part.start, rows.start + part.stop)
+                own[part] = spectrum.rows(plane, index, terms[1])
+
+        each(some, pieces(out.shape[1], rows_at_once(terms[1])), workers)
+
+    return DeviceSpectrum(_in_bands(device, (len(spectrum), *terms), spectrum.dtype, fill), device)
+
+
+def _in_bands(
+    device: Processor,
+    shape: tuple[int, int, int],
+    dtype: DTypeLike,
+    fill: Callable[[slice, Array], None],
+) -> Array:
+    """Return planes (R, ny, nx) on a device of rows that the processor computes: `fill`."""
+    planes, rows, columns = shape
+    out = device.zeros(shape, dtype)
+    for band in pieces(rows, max(1, COPIED // columns)):
+        part: Array = np.empty((planes, band.stop - band.start, columns), dtype)
+        fill(band, part)
+        out[:, band] = device.put(part)
+    return out
 
 
 def _transform_columns(plane: Array, terms: int, workers: int) -> None:

@@ -21,6 +21,7 @@ import numpy as np
 
 from vcam_cli import memory
 from vcam_cli.arrays import Array
+from vcam_cli.devices.processor import require
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.blurs import Blur, FieldTransfer, RadialTransfer, SeparableTransfer
 from vcam_cli.effects.warps import Warp
@@ -223,6 +224,9 @@ def _spectral_layers(
     mixing = field_mixtures(exact, field_rings, size) if field_rings else mixtures(exact, size)
     needed = memory_model.image_bytes(path, scene, highest, len(mixing[0]), rings)
     memory.require(needed, g.rows, g.columns)
+    if path.device.whole:
+        on_device = memory_model.device_bytes(path, scene, highest, len(mixing[0]))
+        require(path.device, on_device, f"{g.rows} x {g.columns} pixels")
     least = max((part.nyquist(g) for part in rings), default=LOWEST)
     image = sampled_image(path, scene, highest, mixing, least)
     size = table_size(path, image.highest)
@@ -261,8 +265,10 @@ def _spectral_layers(
         table_values=sum(plane.size for plane in planes),
         peak=image.peak,
         memory=needed,
+        device=path.device.label,
     )
-    layers = filtered_layers(image_filter, modes, image.spectrum, path.workers)
+    here = image_filter.on(path.device)
+    layers = filtered_layers(here, modes, image.spectrum, path.workers)
     return chain(layers, far.layers(modes, followed)), report
 
 

@@ -14,21 +14,21 @@ it is with the camera.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Final
 
 import numpy as np
 
 from vcam_cli import memory
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
+from vcam_cli.devices.processor import PROCESSOR, SPLINES, Processor
 from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.temporal.sub_exposed_motion import SubExposedMotion
 from vcam_cli.image_formation.estimates import memory_model
 from vcam_cli.image_formation.optical_path import Layer, Layers, OpticalPath, SpectrumReport
-from vcam_cli.parallel import each
+from vcam_cli.parallel import each, pieces
 from vcam_cli.rng import blocks
 from vcam_cli.scenes.base import Scene
 from vcam_cli.scenes.waves import WaveScene
@@ -36,8 +36,6 @@ from vcam_cli.scenes.waves import WaveScene
 PLACE_SHARE = 0.1
 INSTANT_SHARE = 0.1
 """Parts of the tolerance that places and instants may use."""
-ORDER: Final = 5
-"""Order of the splines."""
 FEWEST_PLACES, MOST_PLACES = 3, 12
 """Fine places along each side of a pixel, but for waves, which may need more: behind a pixel's
 aperture 12 leave less than 2e-5 of full signal between sharp edges."""
@@ -58,6 +56,8 @@ PROBES = 12
 error of the instants."""
 LINES = 192
 """Lines of the fine image along each axis, about, at which the error of places is measured."""
+AT_ONCE = 1 << 22
+"""Places that are copied to a device together."""
 
 FormImage = Callable[[OpticalPath, Scene], tuple[Layers, SpectrumReport]]
 
@@ -66,14 +66,16 @@ FormImage = Callable[[OpticalPath, Scene], tuple[Layers, SpectrumReport]]
 class FineImage:
     """The still image as pixels at closely spaced places see it, as coefficients of splines."""
 
-    coefficients: Array
-    """(C, rows, columns) [e/s]"""
+    coefficients: Sequence[Array]
+    """Of every color (rows, columns), on the device [e/s]."""
     geometry: Geometry
     """Of the places, as if they were pixels."""
     error: float
     """Rms error of places between them [e/s]."""
     full_signal: float
     """Largest signal that counts [e/s]."""
+    device: Processor
+    """Where splines are looked up."""
 
     def look(self, color: int, x: Array, y: Array) -> Array:
         """Return the signal of a color at places.
@@ -88,19 +90,14 @@ class FineImage:
         Returns
         -------
         Array
-            Signal in that shape [e/s].
+            Signal in that shape, on the device [e/s].
         """
-        from scipy import ndimage
-
         g = self.geometry
         pitches = g.pitch_x * g.sampling_scale, g.pitch_y * g.sampling_scale
         column = (x - g.collecting_x) / pitches[0] + (g.columns - 1) / 2
         row = (y - g.collecting_y) / pitches[1] + (g.rows - 1) / 2
-        plane = self.coefficients[color]
-        found = ndimage.map_coordinates(
-            plane, [row, column], order=ORDER, prefilter=False, mode="mirror", output=plane.dtype
-        )
-        return np.asarray(found)
+        put = self.device.put
+        return self.device.interpolated(self.coefficients[color], put(row), put(column))
 
 
 def sub_exposed_motion(path: OpticalPath) -> SubExposedMotion | None:
@@ -158,6 +155,9 @@ def sub_exposed_layers(
     if motion.blur is None:  # the still image has the blur in it
         changes[motion.name] = _change(image, exposure, x, probe)
     layer = Layer(lambda color, rows: exposure.signal(color, x, y[rows]))
+    if path.device.whole:
+        planes = [exposure.whole(color, x, y) for color in range(len(path.mosaic.colors))]
+        layer = Layer(lambda color, rows: planes[color][rows])
     full = image.full_signal or 1.0
     places = path.geometry.pitch_x / image.geometry.pitch_x
     told = replace(
@@ -245,9 +245,14 @@ def _image_on(
         each(partial(_add, values, layer, x, y), blocks(rows), still.workers)
     full = min(float(values.max(initial=0.0)), still.ceiling)
     error = max(_error_between(plane) for plane in values) / 2**DECAY
-    each(partial(_filter_plane, values), list(range(count)), still.workers)
     needed += report.memory
-    return FineImage(values, fine, error, full), replace(report, memory=needed)
+    device, coefficients = still.device, list(values)
+    if device.whole:
+        coefficients = [device.splines(device.put(plane)) for plane in values]
+    else:
+        each(partial(_filter_plane, values), list(range(count)), still.workers)
+    found = FineImage(coefficients, fine, error, full, device)
+    return found, replace(report, memory=needed, device=device.label)
 
 
 def _add(values: Array, layer: Layer, x: Array, y: Array, rows: slice) -> None:
@@ -259,11 +264,7 @@ def _add(values: Array, layer: Layer, x: Array, y: Array, rows: slice) -> None:
 
 def _filter_plane(values: Array, color: int) -> None:
     """Put the coefficients of splines in the place of the values of a color."""
-    from scipy import ndimage
-
-    values[color] = ndimage.spline_filter(
-        values[color], order=ORDER, output=values.dtype, mode="mirror"
-    )
+    values[color] = PROCESSOR.splines(values[color])
 
 
 def _error_between(plane: Array) -> float:
@@ -278,10 +279,10 @@ def _error_between(plane: Array) -> float:
         some = values[:: max(1, len(values) // LINES)]
         odd = some.shape[1] - some.shape[1] % 2
         known = ndimage.spline_filter1d(
-            some[:, 0:odd:2].astype(float), order=ORDER, axis=1, mode="mirror"
+            some[:, 0:odd:2].astype(float), order=SPLINES, axis=1, mode="mirror"
         )
         found = _between(known, np.arange(odd // 2) + 0.5)
-        inner = slice(ORDER, -ORDER if odd // 2 > 2 * ORDER else None)
+        inner = slice(SPLINES, -SPLINES if odd // 2 > 2 * SPLINES else None)
         missed = (found - some[:, 1:odd:2])[:, inner]
         squares += float(np.square(missed, dtype=np.float64).mean()) if missed.size else 0.0
     return math.sqrt(squares)
@@ -293,7 +294,7 @@ def _between(coefficients: Array, at: Array) -> Array:
 
     return np.array(
         [
-            ndimage.map_coordinates(line, [at], order=ORDER, prefilter=False, mode="mirror")
+            ndimage.map_coordinates(line, [at], order=SPLINES, prefilter=False, mode="mirror")
             for line in coefficients
         ]
     )
@@ -310,12 +311,18 @@ class _Exposure:
 
     def signal(self, color: int, x: Array, y: Array) -> Array:
         """Return the signal of a color in rows y (rows,) and columns x (columns,) [e/s]."""
-        out = np.zeros((len(y), len(x)), self.image.coefficients.dtype)
+        device = self.image.device
+        out = device.zeros((len(y), len(x)), self.image.coefficients[color].dtype)
         for share, weight in self.instants():
             at_x, at_y = np.broadcast_arrays(*self.motion.still_places(x, y, share))
             at_x, at_y = (np.broadcast_to(at, out.shape) for at in (at_x, at_y))
             out += out.dtype.type(weight) * self.image.look(color, at_x, at_y)
-        return out
+        return device.get(out)
+
+    def whole(self, color: int, x: Array, y: Array) -> Array:
+        """Return the signal of a color, as many rows at once as a device takes easily [e/s]."""
+        some = pieces(len(y), max(1, AT_ONCE // len(x)))
+        return np.concatenate([self.signal(color, x, y[rows]) for rows in some])
 
     def instants(self) -> Iterator[tuple[float, float]]:
         """Yield instants as shares of the exposure, and their weights."""
@@ -327,7 +334,8 @@ def _change(image: FineImage, exposure: _Exposure, x: Array, y: Array) -> float:
     at_x, at_y = np.broadcast_arrays(x[None, :], y[:, None])
     found = []
     for color in range(len(image.coefficients)):
-        change = exposure.signal(color, x, y) - image.look(color, at_x, at_y)
+        still = image.device.get(image.look(color, at_x, at_y))
+        change = exposure.signal(color, x, y) - still
         found.append(float(np.square(change, dtype=np.float64).mean()))
     return math.sqrt(max(found))
 

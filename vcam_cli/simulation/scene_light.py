@@ -120,6 +120,7 @@ def scene_light(solved: Solved, picture: ScenePicture, run: Run) -> SceneLight:
             mosaic=solved.layout.mosaic,
             effects=effects,
             workers=run.workers,
+            device=run.device,
             optional=solved.effects.optional(effects),
         )
         read = scene_bytes(picture)
@@ -230,7 +231,8 @@ def formed_light(
             if run.rate_cache is None:
                 light = form()
             else:
-                light = run.rate_cache.rate(seen.light_key, seen.path.ceiling, form)
+                key = seen.light_key + run.device.key
+                light = run.rate_cache.rate(key, seen.path.ceiling, form)
             wider = _widened(seen, picture, light)
         if wider is seen:
             return seen, light

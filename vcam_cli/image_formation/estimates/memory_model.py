@@ -79,6 +79,37 @@ def image_bytes(
     return BASE + round(SLACK * held) + WORK * path.workers
 
 
+def device_bytes(path: OpticalPath, scene: SampledScene, highest: float, planes: int) -> int:
+    """Return the memory of a device that the spectrum of an image and its filtering take.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    scene : SampledScene
+        The scene on its grid.
+    highest : float
+        Frequency beyond which nothing counts [pixel Nyquist].
+    planes : int
+        Number of mixtures of the scene's components.
+
+    Returns
+    -------
+    int
+        Bytes.
+    """
+    g, (x, y) = path.geometry, axes(path, scene, highest)
+    # samples, their half spectrum and the coefficients; two series; one plane of complex numbers,
+    # its transform and the work space of that
+    evaluated = max(y.transform * x.folded_terms, g.rows * x.transform)
+    samples = math.prod(scene.shape)
+    if isinstance(scene, ChartScene) and not scene.is_painted:
+        samples = y.terms * x.terms
+    held = 3 * planes * samples + 6 * evaluated
+    held += 2 * len(path.mosaic.colors) * (y.folded_terms + g.rows) * x.folded_terms
+    return held * (path.settings.float_width // 8)
+
+
 def table_bytes(path: OpticalPath, planes: int, size: TableSize) -> int:
     """Return the memory of tables of blurs that have a direction, beside the image.
 

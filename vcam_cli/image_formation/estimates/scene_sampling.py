@@ -15,6 +15,9 @@ from vcam_cli.image_formation.estimates.power_spectrum import PowerSpectrum, pow
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.scene_spectrum import (
     SceneSpectrum,
+    copied_to,
+    painted_on,
+    transform_on,
     transform_painted,
     transform_planes,
 )
@@ -161,6 +164,9 @@ def sampled_image(
         highest = min(max(needed, least), highest)
     else:
         highest = min(highest, knobs.oversampling)
+    if path.device.whole and isinstance(scene, ChartScene) and not scene.is_painted:
+        x, y = axes(path, scene, highest)
+        spectrum = copied_to(path.device, spectrum, (y.terms, x.terms), path.workers)
     return SampledImage(
         scene=scene,
         spectrum=spectrum,
@@ -188,8 +194,17 @@ def _scene_spectrum(
     if isinstance(scene, ChartScene):
         x, y = axes(path, scene, highest)
         terms = y.terms, x.terms
+        if path.device.whole:
+            cells, brightest = painted_on(
+                path.device, replace(scene, dtype=dtype), mix, path.workers
+            )
+            found = transform_on(path.device, cells, terms)
+            return scene, found, float((level.T @ brightest).max())
         painted, brightest = transform_painted(scene, mix, terms, dtype, path.workers)
         return scene, painted, float((level.T @ brightest).max())
     planes: Array = scene.planes(mix, path.workers).astype(dtype, copy=False)
     brightest = np.array([max(float(p.max()), -float(p.min())) for p in planes])
-    return scene, transform_planes(planes, path.workers), float((level.T @ brightest).max())
+    peak = float((level.T @ brightest).max())
+    if path.device.whole:
+        return scene, transform_on(path.device, path.device.put(planes), scene.shape), peak
+    return scene, transform_planes(planes, path.workers), peak

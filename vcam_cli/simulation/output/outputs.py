@@ -370,7 +370,7 @@ def record(result: Photograph, inputs: tuple[Path, ...], seconds: float) -> dict
         "stages": result.stages.seconds,
         "seconds": seconds,
         "peak_memory_bytes": peak_memory(),
-        "device": {"light": "cpu", "charge to codes": frame.device},
+        "device": {"light": frame.spectrum.computed_on, "charge to codes": frame.device},
         "seeds": {"sensor": camera.seed.sensor, "frame": camera.seed.frame},
         "hashes": {
             "camera": config_hash(camera),
