@@ -53,14 +53,18 @@ def accuracy(
     watch: Watch = None,
     report: bool = False,
     formats: Sequence[str] = (),
+    device: str = "cpu",
 ) -> Study:
-    """Return what accuracy costs, along every knob and for every preset: `vcam accuracy`."""
+    """Return what accuracy costs, along every knob and for every preset: `vcam accuracy`.
+
+    device: as that of `simulate`; the converged reference is the processor's.
+    """
     from vcam_cli.accuracy_study import output, study
     from vcam_cli.simulation.output import provenance
 
     model = _camera(camera)
     with _folder(out, "accuracy.json", lambda: provenance.inputs(model)) as folder:
-        found = study.accuracy(model, _threads(workers), observer(watch))
+        found = study.accuracy(model, _threads(workers), observer(watch), device)
         if folder is not None:
             output.write(found, model, folder, report, formats)
     return found

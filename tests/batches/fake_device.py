@@ -90,6 +90,9 @@ class FakeDevice(Processor):
     name = "fake"
     whole = True
 
+    def __init__(self):
+        self.log = []
+
     def describe(self):
         return self.name
 
@@ -99,6 +102,16 @@ class FakeDevice(Processor):
 
     def get(self, array):
         return array.values
+
+    def fetch(self, array):
+        """Copy when it is waited for: who changes the array meanwhile gets what it is then."""
+        self.log.append("begun")
+
+        def wait():
+            self.log.append("waited")
+            return array.values.copy()
+
+        return wait
 
     def zeros(self, shape, dtype):
         return FakeArray(super().zeros(shape, dtype))

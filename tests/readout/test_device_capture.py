@@ -83,7 +83,7 @@ def test_no_device_is_said_with_a_remedy():
     try:
         import cupy  # noqa: F401
     except ImportError:
-        with pytest.raises(CannotDo, match=r"needs cupy, .*pip install 'vcam-cli\[gpu\]'"):
+        with pytest.raises(CannotDo, match=r"needs CuPy, .*pip install 'vcam-cli\[gpu\]'"):
             simulate(load("starter", SMALL), device="gpu")
 
 

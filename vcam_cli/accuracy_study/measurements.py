@@ -88,13 +88,15 @@ class Clock:
     """
 
     workers: int
+    device: str = "cpu"
+    """Device of what is timed; other frames are the processor's."""
     runs: dict[str, list[float]] = field(default_factory=dict)
     """By `resolved` camera [s]"""
     _cameras: dict[str, Camera] = field(default_factory=dict)
     _found: dict[tuple[str, str, tuple[str, ...], bytes], str] = field(default_factory=dict)
 
     def shot(self, camera: Camera, shared: Shared | None = None) -> Shot:
-        """Return a frame of the camera; its time does not count.
+        """Return a frame of the camera by the processor; its time does not count.
 
         shared: what cameras before this one had in common with it.
         """
@@ -138,7 +140,7 @@ class Clock:
 
     def _run(self, key: str) -> Result:
         start = time.perf_counter()
-        result = compute_frame(self._cameras[key], self.workers)
+        result = compute_frame(self._cameras[key], self.workers, self.device)
         self.runs[key].append(time.perf_counter() - start)
         first = self._found.setdefault(_computation(result), key)
         if self.runs[first] is not self.runs[key]:

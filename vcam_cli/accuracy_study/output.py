@@ -66,6 +66,8 @@ def report_arguments(found: Study) -> dict[str, Any]:
         ("reference", convergence(found)),
     ]
     facts += [(f"{knob} does not apply", why) for knob, why in found.absent.items()]
+    if found.device != "cpu":
+        facts.append(("device", computed_on(found)))
     captions = {
         "accuracy.csv": "Errors of the mean raw frame against the reference, relative to full"
         " signal; of a setting with all others converged.",
@@ -80,6 +82,13 @@ def report_arguments(found: Study) -> dict[str, Any]:
         "facts": [Facts("In short", facts)],
         "captions": captions,
     }
+
+
+def computed_on(found: Study) -> str:
+    """Return what was computed where."""
+    return (
+        f"presets, tolerances and times: {found.device}; reference and errors of single knobs: cpu"
+    )
 
 
 def convergence(found: Study) -> str:

@@ -6,6 +6,10 @@ it. A knob's are its own: with all others converged, against the same with this 
 only how far the spectrum is followed is then what the file's accuracy makes it. An effect left out
 is judged with all else on. Seconds are of a whole frame, from the scene to its render and metrics,
 without files: of the file's camera with this one thing changed.
+
+With a graphics processor presets, tolerances and the file's camera are computed there, and so is
+all that is timed. The reference and the errors of single knobs are the processor's: the errors of
+presets include the device's.
 """
 
 from __future__ import annotations
@@ -42,6 +46,7 @@ from vcam_cli.accuracy_study.setting_errors import COLUMNS, Point
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.simulation import PRESETS
+from vcam_cli.devices.choice import open_device
 from vcam_cli.floats import own_float_errors, rms
 from vcam_cli.parallel import available_workers
 from vcam_cli.progress import Observer, Silent
@@ -67,12 +72,15 @@ class Study:
     absent: dict[str, str]
     """Knob that this camera does not have -> why."""
     recommendation: Recommendation
+    device: str = "cpu"
+    """Device of the presets' frames, and of what is timed."""
 
     def report(self) -> dict[str, Any]:
         """Return what accuracy.json holds."""
         return {
             "name": self.camera.name,
             "tolerance": self.camera.accuracy.tolerance,
+            "device": self.device,
             "reference": asdict(self.reference),
             "points": [{**asdict(p), "tolerance_spent": p.tolerance_spent} for p in self.points],
             "effects": [{**asdict(e), "ratio": e.ratio} for e in self.effects],
@@ -92,14 +100,21 @@ class Study:
 
 
 @own_float_errors
-def accuracy(camera: Camera, workers: int | None = None, watch: Observer | None = None) -> Study:
+def accuracy(
+    camera: Camera,
+    workers: int | None = None,
+    watch: Observer | None = None,
+    device: str = "cpu",
+) -> Study:
     """Measure a camera along every knob, with every preset, without every effect.
 
     workers: threads, default all processors, and for what is timed those that a frame takes.
-    watch: told of stages. Raises BadInput, CannotDo.
+    watch: told of stages. device: as that of `simulate`. Raises BadInput, CannotDo.
     """
-    clock = Clock(workers or threads(camera))
-    return _Measurement(camera, clock, workers or available_workers(), watch or Silent()).study()
+    label = open_device(device).label
+    clock = Clock(workers or threads(camera), device)
+    measured = _Measurement(camera, clock, workers or available_workers(), watch or Silent())
+    return replace(measured.study(), device=label)
 
 
 @dataclass

@@ -29,6 +29,7 @@ def accuracy(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
     workers: options.Workers = None,
+    device: options.Device = "cpu",
     wants_report: options.Report = False,
     formats: options.Formats = None,
 ) -> None:
@@ -41,6 +42,7 @@ def accuracy(
     Example:
       vcam accuracy starter
       vcam accuracy camera.yaml -o out/knobs --set optics.f_number=8
+      vcam accuracy starter --device gpu
     """
     from vcam_cli import face
     from vcam_cli.simulation.checks import load
@@ -48,7 +50,7 @@ def accuracy(
     model = load(camera, options.overrides(set_, seed, level))
     path = out or Path("out") / model.name
     with Progress(quiet) as bar:
-        found = face.accuracy(model, path, workers, bar, wants_report, formats or ())
+        found = face.accuracy(model, path, workers, bar, wants_report, formats or (), device)
     options.print_found(found, path, as_json, quiet, print_report)
 
 
@@ -56,7 +58,7 @@ def print_report(found: "Study", path: Path) -> None:
     """Print the tables and the recommendation."""
     from rich.console import Console
 
-    from vcam_cli.accuracy_study.output import convergence
+    from vcam_cli.accuracy_study.output import computed_on, convergence
 
     width = None if sys.stdout.isatty() else 120
     console = Console(width=width, soft_wrap=True, highlight=False)
@@ -67,6 +69,8 @@ def print_report(found: "Study", path: Path) -> None:
     for knob, why in found.absent.items():
         console.print(f"{knob} does not apply: {why}")
     console.print(convergence(found))
+    if found.device != "cpu":
+        console.print(computed_on(found))
     for sentence in found.recommendation.missed:
         console.print(f"{sentence}.")
     console.print(f"recommended: {found.recommendation.sentence}")

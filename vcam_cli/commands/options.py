@@ -262,7 +262,7 @@ Device = Annotated[
         "--device",
         metavar="cpu|gpu",
         callback=_device,
-        help="gpu: noise and readout on a graphics processor, of data sets the light, too.",
+        help="gpu: compute light, noise and readout on a graphics processor (NVIDIA, by CuPy).",
     ),
 ]
 

@@ -57,8 +57,8 @@ PlannedDevice = Annotated[
         "--device",
         metavar="cpu|gpu",
         callback=options.device_name,
-        help="gpu: also estimate the time with noise and readout on a graphics processor (an"
-        " H100); none has to be there.",
+        help="gpu: also estimate the time of each stage with a graphics processor (an H100);"
+        " none has to be there.",
     ),
 ]
 Details = Annotated[
@@ -141,7 +141,9 @@ def plan(
             f"{found.frames_per_second:.4g} frames/s, {most:.4g} at most: {found.readout.reason}"
         )
     if device != "cpu":
-        report["device_seconds"], report["device_start"] = found.device_seconds()
+        cost = found.device_cost()
+        report["device_seconds"], report["device_start"] = cost.first, cost.start
+        report["device"] = cost.report()
     if as_json:
         print(to_json(report), end="")
     elif geometry:
@@ -211,13 +213,23 @@ def facts(
         *([("crosstalk", mixing(report["color_mixing"]))] if "color_mixing" in report else []),
         *([("readout", frame_rate)] if frame_rate else []),
         ("accuracy", f"rms error within {100 * report['settings']['tolerance']:.3g} % of signal"),
-        ("cost", f"about {seconds:.2g} s and {memory:.0f} MB{_on_device(report)}"),
+        ("cost", f"about {seconds:.2g} s and {memory:.0f} MB"),
+        *([("device", _on_device(report))] if "device" in report else []),
     ]
 
 
 def _on_device(report: dict[str, Any]) -> str:
-    """Return what the frame costs on a graphics processor, where that was asked."""
-    if "device_seconds" not in report:
-        return ""
-    first, start = report["device_seconds"], report["device_start"]
-    return f"; with --device gpu {first:.2g} s, then {first - start:.2g} s a frame"
+    """Return what the frame costs with a graphics processor, by stage."""
+    first, start, cost = report["device_seconds"], report["device_start"], report["device"]
+    stages = {
+        "start": start,
+        "light": cost["light"],
+        "noise and readout": cost["charge"],
+        "copies": cost["copies"],
+    }
+    listed = ", ".join(f"{name} {seconds:.2g} s" for name, seconds in stages.items())
+    return (
+        f"with --device gpu {first:.2g} s, then {first - start:.2g} s a frame. By measured"
+        f" constants of an {cost['card']}: {listed}. By this processor {cost['processor']:.2g} s:"
+        f" {', '.join(cost['stays'])}"
+    )

@@ -8,7 +8,8 @@ one.
 from __future__ import annotations
 
 from collections import OrderedDict, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.config.document import Document
 from vcam_cli.datasets.drawing import Frame
 from vcam_cli.devices.processor import Processor, require
-from vcam_cli.errors import CannotDo
+from vcam_cli.errors import BadInput, CannotDo
 from vcam_cli.files.images.images import read_picture
 from vcam_cli.files.report import to_json
 from vcam_cli.floats import own_float_errors
@@ -60,6 +61,27 @@ def batch_key(frame: Frame, write: Sequence[str]) -> str | None:
     return to_json([shared, size, {**scene.source, "file": ""}])
 
 
+@dataclass(frozen=True)
+class _Begun:
+    """Frames of one gain whose codes are on their way to the processor."""
+
+    frames: Sequence[Frame]
+    times: Sequence[float]
+    gain: float
+    taker: BatchCamera
+    dn: Callable[[], Array]
+    clean: Callable[[], Array]
+
+
+def _finished(groups: Sequence[_Begun]) -> Iterator[Taken]:
+    """Yield the frames of groups as their codes arrive."""
+    for group in groups:
+        arrays = zip(group.frames, group.dn(), group.clean(), group.times, strict=True)
+        for frame, raw, plain, time in arrays:
+            plain = plain.astype(np.float32, copy=False)
+            yield frame, group.taker, raw, plain, time, group.gain
+
+
 class DeviceFrames:
     """Batches of frames that have a camera in common, on a device."""
 
@@ -84,14 +106,22 @@ class DeviceFrames:
         BadInput, CannotDo
             As a simulation does.
         """
-        start = 0
-        while start < len(frames):
-            stop = start + self._at_once
-            with self._device.errors():
-                yield from self._batch(frames[start:stop])
-            start = stop
+        start, begun = 0, list[_Begun]()
+        with self._device.errors():
+            try:
+                while start < len(frames):
+                    stop = start + self._at_once
+                    # It is computed while codes of the one before are copied and used.
+                    ahead = self._batch(frames[start:stop])
+                    yield from _finished(begun)
+                    start, begun = stop, ahead
+            except BadInput:
+                yield from _finished(begun)
+                raise
+            yield from _finished(begun)
 
-    def _batch(self, frames: Sequence[Frame]) -> Iterator[Taken]:
+    def _batch(self, frames: Sequence[Frame]) -> list[_Begun]:
+        """Begin a batch: groups of one gain, whose codes are copied."""
         views: dict[str, int] = {}
         crops, shown = list[Array](), list[int]()
         for frame in frames:
@@ -108,14 +138,15 @@ class DeviceFrames:
         for number, (frame, place) in enumerate(zip(frames, shown, strict=True)):
             time, gain = self._exposure(frame, rates[place], white)
             by_gain[gain].append((number, time))
+        groups = []
         for gain, members in by_gain.items():
             index = self._device.put(np.array([shown[number] for number, _ in members]))
             times = [time for _, time in members]
             seeds = [frames[number].seed for number, _ in members]
-            dn, clean = map(self._device.get, taker.take(rates[index], times, gain, seeds))
-            for raw, plain, (number, time) in zip(dn, clean, members, strict=True):
-                plain = plain.astype(np.float32, copy=False)
-                yield frames[number], taker, raw, plain, time, gain
+            own = [frames[number] for number, _ in members]
+            copies = map(self._device.fetch, taker.take(rates[index], times, gain, seeds))
+            groups.append(_Begun(own, times, gain, taker, *copies))
+        return groups
 
     def _exposure(self, frame: Frame, rate: Array, white: float) -> tuple[float, float]:
         """Return the exposure time [s] and the gain of a frame."""
@@ -136,7 +167,7 @@ class DeviceFrames:
             message = f"{', '.join(names)}: the light depends on the exposure time"
             raise CannotDo(message, "use --device cpu")
         taker, light, white = ready(solved, shape, self._device)
-        each = frame_bytes(taker) + light.bytes_per_picture(shape[-1])
+        each = frame_bytes(taker) + light.bytes_per_picture(shape[-1]) + waiting_bytes(taker)
         require(self._device, each, "a frame")
         self._at_once = min(BATCH, self._device.free_memory() // each)
         self._ready = taker, light, white
@@ -159,6 +190,12 @@ class DeviceFrames:
     @property
     def _picture_bytes(self) -> int:
         return sum(picture.nbytes for picture in self._pictures.values())
+
+
+def waiting_bytes(taker: BatchCamera) -> int:
+    """Return the memory of a frame's codes, with and without noise, until they are copied."""
+    g = taker.solved.geometry
+    return g.rows * g.columns * (np.dtype(np.uint32).itemsize + np.dtype(taker.dtype).itemsize)
 
 
 _KEPT: OrderedDict[tuple[int, str], DeviceFrames] = OrderedDict()

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -23,7 +23,7 @@ PINNED = 1 << 20
 OPTIONS = ("--std=c++17", "--fmad=false")
 """No fused products: sums round as those of NumPy."""
 SOURCE = Path(__file__).parent / "kernels.cu"
-REMEDY = "pip install 'vcam-cli[gpu]' on a machine with a driver of NVIDIA, or use --device cpu"
+REMEDY = "pip install 'vcam-cli[gpu]' on a machine with an NVIDIA driver, or use --device cpu"
 
 
 class Cuda(Processor):
@@ -79,6 +79,25 @@ class Cuda(Processor):
         out = self._pinned(array.shape, array.dtype) if array.nbytes >= PINNED else None
         host: Array = self._cupy.asnumpy(array, out=out)
         return host
+
+    def fetch(self, array: Array) -> Callable[[], Array]:
+        """Begin to copy an array on a second stream, to pinned memory."""
+        array = self._cupy.ascontiguousarray(array)
+        host = self._pinned(array.shape, array.dtype)
+        stream = self._second_stream
+        stream.wait_event(self._cupy.cuda.get_current_stream().record())
+        array.get(stream=stream, out=host, blocking=False)  # type: ignore[attr-defined]
+        copied = stream.record()
+
+        def wait(held: Array = array) -> Array:  # it is not freed before
+            copied.synchronize()
+            return host
+
+        return wait
+
+    @cached_property
+    def _second_stream(self) -> Any:
+        return self._cupy.cuda.Stream(non_blocking=True)
 
     def zeros(self, shape: tuple[int, ...], dtype: DTypeLike) -> Array:
         """Return an array of zeros on the device."""
@@ -290,7 +309,7 @@ def open_cuda() -> Cuda:
     try:
         import cupy
     except ImportError as error:
-        raise CannotDo("a graphics processor needs cupy, which is not installed", REMEDY) from error
+        raise CannotDo("a graphics processor needs CuPy, which is not installed", REMEDY) from error
     try:
         count = cupy.cuda.runtime.getDeviceCount()
     except cupy.cuda.runtime.CUDARuntimeError as error:

@@ -8,8 +8,9 @@ CuPy's. A copy between both is always written out, as `put` or `get`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from functools import partial
 from typing import Any, ClassVar, Final
 
 import numpy as np
@@ -63,6 +64,13 @@ class Processor:
     def get(self, array: Array) -> Array:
         """Return an array of the device as one of NumPy."""
         return array
+
+    def fetch(self, array: Array) -> Callable[[], Array]:
+        """Begin to copy an array to the processor; return what waits for the copy.
+
+        Meanwhile the device computes, and the array must not be changed.
+        """
+        return partial(self.get, array)
 
     def zeros(self, shape: tuple[int, ...], dtype: DTypeLike) -> Array:
         """Return an array of zeros on the device."""

@@ -36,9 +36,6 @@ EXR = 28e-9
 """One noisy value into an EXR file [s]."""
 ESTIMATE = 25e-9
 """One sample of a pixel into its photocurrent, once [s]."""
-DEVICE_START, DEVICE_PIXEL = 2.5, 1e-10
-"""Opening a graphics processor and compiling its kernels, once in a process, and the charge of one
-pixel through noise and ADC to codes on the processor: an H100 [s]."""
 BANDS_AT_ONCE = 4
 """Bands of the spectral irradiance that are computed together, as the colors of a frame are."""
 PNG = 14e-9
@@ -230,31 +227,3 @@ def frame_seconds(camera: Solved, report: SpectrumReport, plan: Plan, workers: i
     core += sample_seconds(camera, plan.active)
     core += irradiance_seconds(camera, report)
     return core * slowness() / threads(workers)
-
-
-def device_seconds(camera: Solved, plan: Plan, workers: int) -> tuple[float, float]:
-    """Return the seconds of a frame whose charge is read on a graphics processor.
-
-    Parameters
-    ----------
-    camera : Solved
-        The camera.
-    plan : Plan
-        Its plan, with the seconds of the whole frame on the processor.
-    workers : int
-        Number of threads of the processor.
-
-    Returns
-    -------
-    seconds : float
-        A frame, the first of a process [s].
-    start : float
-        Part of it that further frames do not take [s].
-    """
-    geometry = camera.layout.lattice
-    pixels = geometry.rows * geometry.columns
-    on_charge: tuple[Effect, ...] = of_kind(plan.active, ElectronEffect, Quantizer)
-    each = sum(e.seconds_per_pixel for e in on_charge)
-    charge = pixels * each * slowness() / threads(workers)
-    left = max(plan.seconds - charge, 0.0)
-    return left + pixels * DEVICE_PIXEL + DEVICE_START, DEVICE_START

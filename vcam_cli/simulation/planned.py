@@ -8,7 +8,7 @@ from typing import Any
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.frame_rate import FrameRate
 from vcam_cli.progress import Observer
-from vcam_cli.simulation import cost_model
+from vcam_cli.simulation.device_cost import DeviceCost, device_cost
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.remarks import Notes
 from vcam_cli.simulation.simulate import prepare, threads
@@ -66,9 +66,9 @@ class PlannedRun:
             for color, row in zip(colors, sharing.matrix, strict=True)
         }
 
-    def device_seconds(self) -> tuple[float, float]:
-        """Return the seconds with a graphics processor: a first frame, and what only that takes."""
-        return cost_model.device_seconds(self.ready.solved, self.ready.plan, self.workers)
+    def device_cost(self) -> DeviceCost:
+        """Return the seconds of a frame with a graphics processor, by stage."""
+        return device_cost(self.ready, self.workers)
 
     def __repr__(self) -> str:
         """Return a line: name, effects that run, seconds and memory expected."""

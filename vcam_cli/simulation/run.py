@@ -20,7 +20,7 @@ class Run:
     rate_cache: RateCache | None = None
     """Cache of the light for further cameras."""
     device: Processor = field(default_factory=Processor)
-    """Where charge, noise and codes are computed."""
+    """Where light is filtered, and charge, noise and codes are computed."""
     earlier: float = 0.0
     """Estimated time of what came before, such as the autofocus; the plan counts it [s]."""
 

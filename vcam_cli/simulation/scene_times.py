@@ -42,7 +42,7 @@ class SceneTimes:
         return statistics.median(self.every)
 
 
-def compute_frame(camera: Camera, workers: int) -> Result:
+def compute_frame(camera: Camera, workers: int, device: str = "cpu") -> Result:
     """Compute a frame from the scene to its render and metrics; no file is written.
 
     Parameters
@@ -51,6 +51,8 @@ def compute_frame(camera: Camera, workers: int) -> Result:
         The camera.
     workers : int
         Number of threads.
+    device : str, optional
+        As that of `simulate`.
 
     Returns
     -------
@@ -64,7 +66,7 @@ def compute_frame(camera: Camera, workers: int) -> Result:
     CannotDo
         Where memory does not suffice.
     """
-    result = simulate(camera, workers, shared=Shared())
+    result = simulate(camera, workers, shared=Shared(), device=device)
     if camera.output.render:
         _ = result.render
     _ = result.metrics

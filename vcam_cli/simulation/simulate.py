@@ -14,6 +14,7 @@ from vcam_cli.floats import own_float_errors
 from vcam_cli.parallel import suitable_workers
 from vcam_cli.progress import Callback, Observer, Stages, observer
 from vcam_cli.simulation import pipeline, remarks
+from vcam_cli.simulation.device_cost import device_note
 from vcam_cli.simulation.photograph import Photograph, needs_picture
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.run import Run
@@ -104,8 +105,8 @@ def simulate(
         What cameras before this one had in common with it; results do not depend on it. By
         default the light of the last cameras, 64 MB of it, and their picture up to 64 MB.
     device : str, optional
-        "gpu" draws noise and reads the charge on a graphics processor, with other random numbers
-        of the same statistics; the light is the processor's. See `frames` for many pictures.
+        "gpu" computes light, noise and readout on a graphics processor: light that differs by
+        rounding, and other random numbers of the same statistics. See `frames` for many pictures.
     before : Result, optional
         The frame before this one in a sequence, whose charge lags (`pixel.lag`); by default the
         pixels have seen the light of this one.
@@ -172,6 +173,8 @@ def prepare(
 def _simulate(camera: Camera, run: Run, shared: Shared, before: Result | None) -> Result:
     last = None if before is None else before.frame
     frame, steps, notes = pipeline.take(camera, run, shared, last)
+    if run.device.whole:
+        notes = (*notes, device_note(frame, frame.spectrum.computed_on))
     result = Result(frame, run.stages, run.workers, steps, remarks.Notes(frame, notes))
     if needs_picture(
         frame.solved

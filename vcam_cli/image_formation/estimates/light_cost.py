@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import Effect, of_kind
@@ -103,6 +103,63 @@ WAVES = WaveScene | HarmonicScene
 """Scenes of few waves, whose frequencies are known."""
 
 
+@dataclass(frozen=True)
+class FilterWork:
+    """What a device computes of an image in place of the processor, as counts."""
+
+    samples: float = 0.0
+    """Samples of all planes that are transformed."""
+    terms: float = 0.0
+    """Terms that are filtered, by plane and color."""
+    values: float = 0.0
+    """Pixels that are evaluated, by color and filter."""
+    looks: float = 0.0
+    """Places of a moving image that are looked up, by color and instant."""
+
+    @property
+    def seconds(self) -> float:
+        """Time that they take the processor [core seconds]."""
+        filtered = SAMPLE * self.samples + TERM * self.terms + EVALUATE * self.values
+        return filtered + LOOK * self.looks
+
+    def __add__(self, other: FilterWork) -> FilterWork:
+        """Return the sum of the work on two images."""
+        mine, others = astuple(self), astuple(other)
+        return FilterWork(*(a + b for a, b in zip(mine, others, strict=True)))
+
+
+def filter_work(geometry: Geometry, colors: int, report: SpectrumReport) -> FilterWork:
+    """Return what a device would compute of an image as it was formed, layers included.
+
+    Parameters
+    ----------
+    geometry, colors, report
+        As those of `image_seconds`.
+    """
+    flat = _flat_work(geometry, colors, report)
+    return sum((filter_work(*part) for part in report.parts), flat)
+
+
+def _flat_work(geometry: Geometry, colors: int, report: SpectrumReport) -> FilterWork:
+    values = geometry.rows * geometry.columns * colors
+    looks = _looks(values, colors, report)
+    if report.is_averaged or not report.terms:
+        return FilterWork(looks=looks)
+    return FilterWork(
+        samples=report.cells * report.planes,
+        terms=report.terms * report.planes * colors * report.filters,
+        values=report.filters * values * (SHEARED if report.is_sheared else 1),
+        looks=looks,
+    )
+
+
+def _looks(values: int, colors: int, report: SpectrumReport) -> float:
+    """Return the places looked up at all instants of an exposure; a mosaic needs half of them."""
+    if not report.sub_exposures:
+        return 0.0
+    return values * (0.5 if colors > 1 else 1.0) * (report.sub_exposures + PROBED)
+
+
 def image_seconds(geometry: Geometry, colors: int, report: SpectrumReport) -> float:
     """Return the core seconds of an image as it was formed, that of layers included.
 
@@ -134,7 +191,8 @@ def image_seconds(geometry: Geometry, colors: int, report: SpectrumReport) -> fl
 
 def _flat_seconds(geometry: Geometry, colors: int, report: SpectrumReport) -> float:
     values = geometry.rows * geometry.columns * colors
-    always = FIXED + _sub_exposure_seconds(values, colors, report) + report.edge_seconds
+    work = _flat_work(geometry, colors, report).seconds
+    always = FIXED + _spline_seconds(colors, report) + report.edge_seconds + work
     if report.is_averaged:
         painted = PAINT_PIXEL * geometry.rows * geometry.columns if report.is_painted else 0.0
         sampled = AVERAGE_SAMPLED * (values + report.cells) if report.cells else 0.0
@@ -146,9 +204,7 @@ def _flat_seconds(geometry: Geometry, colors: int, report: SpectrumReport) -> fl
         always
         + SPECTRUM
         + FAR_PART * report.far_parts
-        + (SAMPLE + PAINT * report.is_painted) * report.cells * report.planes
-        + TERM * report.terms * report.planes * colors * report.filters
-        + EVALUATE * report.filters * values * (SHEARED if report.is_sheared else 1)
+        + PAINT * report.is_painted * report.cells * report.planes
         + FAR * report.far_filters * values
         + FIELD * report.oversampling**2 * report.has_field
         + report.field_seconds
@@ -161,16 +217,9 @@ def _flat_seconds(geometry: Geometry, colors: int, report: SpectrumReport) -> fl
     )
 
 
-def _sub_exposure_seconds(values: int, colors: int, report: SpectrumReport) -> float:
-    """Return the core seconds of the mean over the instants of an exposure.
-
-    `values` are the pixels' values of all colors; a mosaic needs about half of them.
-    """
-    if not report.sub_exposures:
-        return 0.0
-    half = 0.5 if colors > 1 else 1.0
-    fine = (EVALUATE + SPLINE) * report.fine_pixels * colors
-    return fine + LOOK * values * half * (report.sub_exposures + PROBED)
+def _spline_seconds(colors: int, report: SpectrumReport) -> float:
+    """Return the core seconds of the still image behind sub-exposures."""
+    return (EVALUATE + SPLINE) * report.fine_pixels * colors if report.sub_exposures else 0.0
 
 
 @dataclass(frozen=True)
