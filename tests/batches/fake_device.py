@@ -1,7 +1,7 @@
 """A device that is none: NumPy's arrays that refuse hidden copies, as those of CuPy do.
 
 It refuses what CuPy refuses: conversion by `np.asarray`, mixing with arrays of NumPy, functions of
-NumPy that CuPy lacks, methods of ufuncs.
+NumPy that CuPy lacks, methods of ufuncs, and generalized ones (`np.matmul`; `@` is its own).
 """
 
 from typing import Any
@@ -44,7 +44,7 @@ class FakeArray(NDArrayOperatorsMixin):
         raise TypeError("Implicit conversion to a NumPy array is not allowed")
 
     def __array_ufunc__(self, ufunc, method, *inputs, **kwargs):
-        if method != "__call__":
+        if method != "__call__" or ufunc.signature is not None:
             return NotImplemented
         if "out" in kwargs:
             [out] = kwargs["out"]
@@ -56,6 +56,9 @@ class FakeArray(NDArrayOperatorsMixin):
         if func.__name__ not in FUNCTIONS:
             raise TypeError(f"{func.__name__}: not among the functions of a device")
         return _fake(func(*_own(args), **{k: _own(v) for k, v in kwargs.items()}))
+
+    def __matmul__(self, other: "FakeArray") -> "FakeArray":
+        return FakeArray(self.values @ other.values)
 
     def __getattr__(self, name: str) -> Any:
         if name in ("dtype", "shape", "ndim", "size", "nbytes"):

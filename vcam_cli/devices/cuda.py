@@ -126,10 +126,9 @@ class Cuda(Processor):
         """Return the coefficients of splines through an image that is mirrored."""
         from cupyx.scipy import ndimage
 
-        found: Array = ndimage.spline_filter(
-            values, order=SPLINES, output=values.dtype, mode="mirror"
-        )
-        return found
+        wide = values.astype(np.float64)  # recursions in 64 bits, as SciPy's
+        found: Array = ndimage.spline_filter(wide, order=SPLINES, mode="mirror")
+        return found.astype(values.dtype)
 
     def interpolated(self, coefficients: Array, row: Array, column: Array) -> Array:
         """Return the image of `splines` between its samples."""

@@ -269,7 +269,7 @@ class Filter:
                     total: Array | None = None
                     for plane, of_plane in zip(planes, values[:, colors], strict=True):
                         light = (
-                            np.matmul(shares[at], of_plane)
+                            shares[at] @ of_plane
                             if few
                             else product(shares[at], of_plane[0])[None]
                         )

@@ -166,8 +166,7 @@ class DeviceSpectrum(SampledSpectrum):
             self.device.put(np.repeat(np.eye(len(edges) - 1), np.diff(edges), axis=0), self.dtype)
             for edges in (y, x)
         ]
-        along_x = np.matmul(first * second, members[1])
-        sums = np.matmul(members[0].T, along_x)
+        sums = members[0].T @ ((first * second) @ members[1])
         return self.device.get(sums).astype(np.float64)
 
 
