@@ -34,10 +34,18 @@ def test_a_graphics_processor_saves_noise_and_readout_and_takes_its_start():
     """Twelve times the pixels: further frames cost less there, a first one more."""
     large = ["--set", "array.rows=600", "--set", "array.columns=800", "--json"]
     here, there = json.loads(plan(*large)), json.loads(plan(*large, "--device", "gpu"))
-    assert set(there) - set(here) == {"device_seconds", "device_start"}
+    assert set(there) - set(here) == {"device_seconds", "device_start", "device"}
+    cost = there["device"]
+    stages = sum(cost[name] for name in ("light", "charge", "copies", "processor"))
+    assert cost["card"] == "NVIDIA H100"
+    assert "painting of charts" in cost["stays"]
+    assert there["device_seconds"] == pytest.approx(there["device_start"] + stages)
     further = there["device_seconds"] - there["device_start"]
     assert 0 < further < there["seconds"] < there["device_seconds"]
-    said = r"with --device gpu [\d.e-]+ s, then [\d.e-]+ s a frame"
+    said = (
+        r"with --device gpu [\d.e-]+ s, then [\d.e-]+ s a frame\. By measured constants of an"
+        r" NVIDIA H100: start 2\.5 s, light .* By this processor [\d.e-]+ s: painting of charts"
+    )
     assert re.search(said, " ".join(plan("--device", "gpu").split()))
 
 

@@ -55,6 +55,17 @@ def rows(folder):
         return list(csv.DictReader(file))
 
 
+def test_a_batch_is_begun_before_codes_of_the_one_before_are_waited_for(fake, study, tmp_path):
+    """Copies overlap with computing: of two batches the second is begun while the first waits."""
+    text = study.read_text().replace("shards: 2", "shards: 1")
+    text = text.replace("  exposure.gain: {choice: [1, 4]}\n", "")
+    study.write_text(text)
+    found = dataset(study, tmp_path / "gpu", device="gpu", workers=1)
+    assert (found.failed, found.computed) == (0, 12)
+    # Two copies a batch, of one gain: the first batch is a single frame, the second the rest.
+    assert fake.log == [*["begun"] * 4, *["waited"] * 4]
+
+
 def test_labels_and_light_are_those_of_single_frames(fake, study, tmp_path):
     here = dataset(study, tmp_path / "cpu", workers=1)
     there = dataset(study, tmp_path / "gpu", device="gpu", workers=1)

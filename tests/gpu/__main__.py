@@ -235,6 +235,69 @@ def means(device: Processor) -> str:
     return f"{', '.join(said)} of full signal"
 
 
+def series(device: Processor) -> str:
+    """Series along an axis, splines and copies in the background, against those of SciPy."""
+    rng, host, most = np.random.default_rng(4), Processor(), 0.0
+    for dtype, allowed in ((np.float32, 2e-6), (np.float64, 1e-13)):
+        kind = np.complex64 if dtype == np.float32 else np.complex128
+        for count in (1, 2, 33, 480, 1001):
+            for axis, shape in enumerate(((count, 7), (7, count))):
+                values = rng.standard_normal(shape).astype(dtype)
+                waves = (values + 1j * rng.standard_normal(shape)).astype(kind)
+                pairs = [
+                    (device.dct3(device.put(values), axis, odd), host.dct3(values, axis, odd))
+                    for odd in (False, True)
+                ]
+                pairs.append((device.fft(device.put(waves.copy()), axis), host.fft(waves.copy(), axis)))
+                pairs.append((device.ifft(device.put(waves.copy()), axis), host.ifft(waves.copy(), axis)))
+                for found, truth in pairs:
+                    copied = device.get(found)
+                    assert copied.dtype == truth.dtype, (copied.dtype, truth.dtype)
+                    error = float(np.abs(copied - truth).max() / np.abs(truth).max())
+                    assert error < allowed, (dtype, count, axis, error)
+                    most = max(most, error) if dtype == np.float32 else most
+        image = rng.random((90, 70)).astype(dtype)
+        row, column = rng.uniform(0, 89, (40, 50)), rng.uniform(0, 69, (40, 50))
+        there = device.splines(device.put(image))
+        looked = device.get(device.interpolated(there, device.put(row), device.put(column)))
+        truth = host.interpolated(host.splines(image), row, column)
+        error = float(np.abs(looked - truth).max())
+        assert error < 10 * allowed, (dtype, error)
+    large = device.put(rng.random((64, 512, 512)).astype(np.float32))
+    waits = [device.fetch(part) for part in large]
+    assert all((wait() == device.get(part)).all() for wait, part in zip(waits, large, strict=True))
+    return f"at most {most:.2g} of the largest, 32 bits"
+
+
+ROLL = "scene.camera_motion={roll: 40 deg/s}"
+LIGHTS = (
+    *(("starter", ()), ("still-life", ()), ("still-life", ("accuracy={float_width: 64}",))),
+    *(("everything", ()), ("street", ()), ("x3-stacked", ()), ("cfa-honeycomb", ())),
+    *(("table-top", ()), ("fisheye", ()), ("lateral-color", ()), ("starter", (ROLL,))),
+    *(("still-life", (ROLL,)), ("photograph", ()), ("photograph", ("accuracy=reference",))),
+)
+"""Frames whose light is compared: every way of light that a device filters."""
+
+
+def light_of(name: str, sets: tuple[str, ...]) -> str:
+    """Light of a single frame on the device and on the processor."""
+    from vcam_cli.files.images.png import write_png
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "picture.png"
+        write_png(path, photograph(84, 119))  # samples and pixels have no common grid
+        shown = f"scene.source={{kind: image, file: {path}}}"
+        of_picture = name == "photograph"
+        chosen = ("exposure.time=10 ms", *sets, *((shown,) if of_picture else ()))
+        model = camera("starter" if of_picture else name, 96, 128, *chosen)
+        here, there = simulate(model).frame, simulate(model, device="gpu").frame
+    error = float(np.abs(there.rate - here.rate).max() / here.rate.max())
+    assert error < MEAN, error
+    assert there.spectrum.computed_on != "cpu"
+    assert there.spectrum.oversampling == here.spectrum.oversampling
+    return f"{error:.2g} of full signal"
+
+
 def exchange(device: Processor) -> str:
     """DLPack: torch sees the same memory."""
     import torch
@@ -270,6 +333,7 @@ def commands() -> None:
     from vcam_cli.files.images.png import write_png
 
     small = ("--set", "array.rows=120", "--set", "array.columns=160", "-q")
+    tiny = ("--set", "array.rows=24", "--set", "array.columns=32")
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         write_png(place / "p.png", photograph(1000, 1400))
@@ -281,6 +345,7 @@ def commands() -> None:
             ("sweep", "exposure-and-noise", "-q", "--workers", "1"),
             ("characterize", "starter", "-q"),
             ("dataset", str(place / "set.yaml"), "-q"),
+            ("accuracy", "starter", *tiny, "-q"),
         ):
             out = place / f"{words[0]}{len(words)}"
             asked = [sys.executable, "-m", "vcam_cli.commands.main", *words]
@@ -479,7 +544,30 @@ def bench(device: Processor) -> None:
         asked.pop("gains")
         row("   with times", 64e3 / rate(frames(model, pictures, device=device, **asked)), "ms")
 
+    def single(name: str) -> None:
+        """Seconds of whole frames, of which `vcam plan --device gpu` estimates the stages."""
+        from vcam_cli import plan
+        from vcam_cli.simulation.shared import Shared
+
+        model = load(name)
+        simulate(model, shared=Shared(), device="gpu")  # kernels are compiled
+        spent = {}
+        for kind in ("gpu", "cpu"):
+            least = np.inf
+            for _ in range(3):
+                start = time.perf_counter()
+                result = simulate(model, shared=Shared(), device=kind)
+                least = min(least, time.perf_counter() - start)
+            spent[kind] = least
+            stages = ", ".join(f"{n} {s:.3f}" for n, s in result.stages.seconds.items())
+            row(f"{name}: a frame on the {kind}, light included", least, "s", stages)
+        cost = plan(model).device_cost()
+        said = f"light {cost.light:.2g}, charge {cost.charge:.2g}, copies {cost.copies:.2g}"
+        row(f"{name}: a further frame by the plan", cost.further, "s", said)
+
     check("bench of Python", host_time)
+    for name in ("12mp-bayer", "still-life", "everything"):
+        check(f"bench of single frames, {name}", lambda name=name: single(name))
     for name, function in (("bench 512²", small), ("bench 12 MP", large), ("bench 1 MP", sequence)):
         check(name, function)
 
@@ -495,6 +583,10 @@ def main() -> int:
         check("transforms", lambda: transforms(device))
         for name in NAMES:
             check(f"frames of {name}", lambda name=name: frames_of(device, name))
+        check("series, splines, copies", lambda: series(device))
+        for name, sets in LIGHTS:
+            said = " ".join((name, *sets))
+            check(f"light of {said}", lambda name=name, sets=sets: light_of(name, sets))
         check("times, gains, places", lambda: per_frame(device))
         check("means of single frames", lambda: means(device))
         check("exchange with torch", lambda: exchange(device))

@@ -14,7 +14,7 @@ from vcam_cli.accuracy_study.ablation import with_effects
 from vcam_cli.arguments import brief, require_whole
 from vcam_cli.arrays import Array
 from vcam_cli.batches.batch_camera import BatchCamera, refuse_unsupported
-from vcam_cli.batches.light import DeviceLight, ProcessorLight, pictures_light, seen_by
+from vcam_cli.batches.light import DeviceLight, SingleLight, pictures_light, seen_by
 from vcam_cli.batches.pictures import Places, linear_pictures, stacks
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.scene.scene_files import ImageFile
@@ -218,7 +218,7 @@ def _batches(
 ) -> Iterator[FrameBatch]:
     """Yield the batches of stacked pictures; see `frames`."""
     first = first_picture = 0
-    camera_of: tuple[BatchCamera, DeviceLight | ProcessorLight, float] | None = None
+    camera_of: tuple[BatchCamera, DeviceLight | SingleLight, float] | None = None
     shape: tuple[int, ...] = ()
     fitting: set[tuple[int, int]] = set()
     for stack in stacked:
@@ -266,7 +266,7 @@ def solved_for(camera: Camera) -> Solved:
 
 def ready(
     solved: Solved, shape: tuple[int, ...], device: Processor, workers: int | None = None
-) -> tuple[BatchCamera, DeviceLight | ProcessorLight, float]:
+) -> tuple[BatchCamera, DeviceLight | SingleLight, float]:
     """Return a camera that takes batches of frames, the light of its pictures, and its white.
 
     Parameters
@@ -284,7 +284,7 @@ def ready(
     -------
     taker : BatchCamera
         From rates to codes.
-    light : DeviceLight or ProcessorLight
+    light : DeviceLight or SingleLight
         From pictures to rates.
     white : float
         Rate of the perfect white in its brightest color [e/s].
@@ -336,7 +336,7 @@ def frame_bytes(taker: BatchCamera) -> int:
 
 def _require(
     device: Processor,
-    light: DeviceLight | ProcessorLight,
+    light: DeviceLight | SingleLight,
     taker: BatchCamera,
     pictures: int,
     count: int,

@@ -1,7 +1,7 @@
 """The light of many pictures of one size in a camera's pixels, all effects acting.
 
-On a device it is one filter, where a picture takes no more than one; elsewhere the processor
-computes the light of each picture, as for a single frame, and it is copied.
+It is one filter for all, where a picture takes no more than one; elsewhere the light of each picture
+is computed as that of a single frame, and copied.
 """
 
 from __future__ import annotations
@@ -67,17 +67,17 @@ class DeviceLight:
 
 
 @dataclass(frozen=True)
-class ProcessorLight:
-    """Light that the processor computes, picture by picture."""
+class SingleLight:
+    """Light that is computed picture by picture, as that of single frames."""
 
     device: Processor
     solved: Solved
     workers: int
-    where = "cpu"
+    where = "picture by picture"
 
     def rates(self, pictures: Array) -> Array:
         """Return the photo-electrons per second of every pixel, as those of `DeviceLight`."""
-        run = Run(self.workers, Stages())
+        run = Run(self.workers, Stages(), device=self.device)
         host = self.device.get(pictures)
         found = [prepare_light(self.solved, picture, run).rate for picture in host]
         return self.device.put(np.array(found))
@@ -105,7 +105,7 @@ def seen_by(solved: Solved, shape: tuple[int, int, int], workers: int) -> SceneL
 
 def pictures_light(
     seen: SceneLight, shape: tuple[int, int, int], workers: int, device: Processor
-) -> DeviceLight | ProcessorLight:
+) -> DeviceLight | SingleLight:
     """Return what brings pictures of a shape to the pixels.
 
     Parameters
@@ -120,15 +120,15 @@ def pictures_light(
         The device.
     """
     solved, scene, layout = seen.solved, seen.scene, seen.solved.layout
-    by_processor = ProcessorLight(device, solved, workers)
+    single = SingleLight(device, solved, workers)
     late = of_kind(seen.path.effects, TemporalGain)
     # Crosstalk and smear act behind the light, and are among the effects on charge.
     shared = of_kind(solved.effects.enabled, NeighborSharing, ColumnSpread)
     if layout.planes or layout.is_scattered or late or shared:
-        return by_processor
+        return single
     found = picture_filter(seen.path, scene)
     if found is None:
-        return by_processor
+        return single
     image_filter, dtype = found
     assert isinstance(scene, ImageScene)
     mosaic = layout.mosaic

@@ -18,7 +18,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.batches.batch_camera import BatchCamera
 from vcam_cli.batches.frames import frame_bytes, metered, ready, solved_for, timed_effects
-from vcam_cli.batches.light import DeviceLight, ProcessorLight
+from vcam_cli.batches.light import DeviceLight, SingleLight
 from vcam_cli.batches.pictures import linear_pictures
 from vcam_cli.camera.camera import Camera
 from vcam_cli.config.document import Document
@@ -88,7 +88,7 @@ class DeviceFrames:
     def __init__(self, camera: Camera, device: Processor) -> None:
         self._device, self._camera = device, camera
         self._pictures: OrderedDict[Path, Array] = OrderedDict()
-        self._ready: tuple[BatchCamera, DeviceLight | ProcessorLight, float] | None = None
+        self._ready: tuple[BatchCamera, DeviceLight | SingleLight, float] | None = None
         self._at_once = 1
         """Frames of a batch: one makes the camera ready, then as many as memory holds."""
 
@@ -160,7 +160,7 @@ class DeviceFrames:
 
     def _make_ready(
         self, shape: tuple[int, ...]
-    ) -> tuple[BatchCamera, DeviceLight | ProcessorLight, float]:
+    ) -> tuple[BatchCamera, DeviceLight | SingleLight, float]:
         """Make the camera ready for pictures of a shape, and choose how many are at once."""
         solved = solved_for(self._camera)
         if names := timed_effects(solved):
