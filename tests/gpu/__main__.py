@@ -248,8 +248,12 @@ def series(device: Processor) -> str:
                     (device.dct3(device.put(values), axis, odd), host.dct3(values, axis, odd))
                     for odd in (False, True)
                 ]
-                pairs.append((device.fft(device.put(waves.copy()), axis), host.fft(waves.copy(), axis)))
-                pairs.append((device.ifft(device.put(waves.copy()), axis), host.ifft(waves.copy(), axis)))
+                pairs.append(
+                    (device.fft(device.put(waves.copy()), axis), host.fft(waves.copy(), axis))
+                )
+                pairs.append(
+                    (device.ifft(device.put(waves.copy()), axis), host.ifft(waves.copy(), axis))
+                )
                 for found, truth in pairs:
                     copied = device.get(found)
                     assert copied.dtype == truth.dtype, (copied.dtype, truth.dtype)

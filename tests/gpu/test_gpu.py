@@ -20,7 +20,9 @@ def device():
         pytest.skip(str(error))
 
 
-@pytest.mark.parametrize("check", ["words", "transforms", "series", "per_frame", "means", "too_large"])
+@pytest.mark.parametrize(
+    "check", ["words", "transforms", "series", "per_frame", "means", "too_large"]
+)
 def test_check(device, check):
     assert getattr(checks, check)(device)
 
@@ -51,6 +53,8 @@ def test_statistics(device, judge):
 def test_single_frames(device, name):
     camera = load(name, ["array.rows=70", "array.columns=64", "exposure.time=10 ms"])
     here, there = simulate(camera), simulate(camera, device="gpu")
-    assert np.abs(there.clean_dn - here.clean_dn).max() < checks.MEAN * here.frame.chain.saturated_dn
+    assert (
+        np.abs(there.clean_dn - here.clean_dn).max() < checks.MEAN * here.frame.chain.saturated_dn
+    )
     spread = (here.dn.astype(float) - here.clean_dn).std()
     assert (there.dn.astype(float) - there.clean_dn).std() == pytest.approx(spread, rel=0.1)

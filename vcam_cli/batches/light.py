@@ -1,7 +1,7 @@
 """The light of many pictures of one size in a camera's pixels, all effects acting.
 
-It is one filter for all, where a picture takes no more than one; elsewhere the light of each picture
-is computed as that of a single frame, and copied.
+It is one filter for all, where a picture takes no more than one; elsewhere the light of each
+picture is computed as that of a single frame, and copied.
 """
 
 from __future__ import annotations

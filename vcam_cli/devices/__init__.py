@@ -1,1 +1,1 @@
-"""Where batches of frames are computed: the processor, or a graphics processor."""
+"""Where light and noise are computed: the processor, or a graphics processor."""

@@ -2,7 +2,7 @@
 
 Code of the hot path takes arrays of either kind: NumPy hands its functions to the library of the
 array (NEP 13 and NEP 18), so that an effect is written once. What that does not cover is a
-`Device`: new arrays, copies, random numbers, cosine transforms. `Processor` has NumPy's, `cuda.py`
+`Device`: new arrays, copies, random numbers, transforms, splines. `Processor` has NumPy's, `cuda.py`
 CuPy's. A copy between both is always written out, as `put` or `get`.
 """
 
@@ -33,7 +33,7 @@ class Processor:
 
     name: ClassVar[str] = "cpu"
     whole: ClassVar[bool] = False
-    """Whether arrays are computed whole, in one thread, and not in pieces for caches and threads."""
+    """Whether arrays are computed whole by one thread, and not in pieces for caches and threads."""
 
     def describe(self) -> str:
         """Return the device and its library, for `run.json`."""
@@ -292,7 +292,7 @@ class Processor:
 
 
 PROCESSOR = Processor()
-"""The processor, where nothing else is asked for."""
+"""The processor: the device unless another is chosen."""
 
 
 def require(device: Processor, needed: int, what: str) -> None:

@@ -411,8 +411,4 @@ def filtered_layers(
     for mode in (None, *modes):
         chosen = image_filter if mode is None else replace(image_filter, tables=mode.tables())
         series = chosen.apply(spectrum, workers)
-        values = series.signal
-        if chosen.x.device.whole:
-            planes = series.on_processor()
-            values = lambda color, rows, planes=planes: planes[color][rows]  # noqa: E731
-        yield Layer(values, None if mode is None else mode.map)
+        yield Layer(series.on_processor(), None if mode is None else mode.map)

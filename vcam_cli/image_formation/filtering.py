@@ -9,7 +9,7 @@ share.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -68,10 +68,13 @@ class Series:
         found = [self.x.evaluate(part, axis=1, odd=odd) for odd, part in parts.items()]
         return found[0] if len(found) == 1 else found[0] + found[1]
 
-    def on_processor(self) -> list[Array]:
-        """Return the signal of every color at all photodetectors, copied to the processor."""
+    def on_processor(self) -> Callable[[int, slice], Array]:
+        """Return `signal` for the processor; of a device all of it is computed and copied now."""
+        if not self.x.device.whole:
+            return self.signal
         colors = range(len(next(iter(self.parts.values()))))
-        return [self.x.device.get(self.signal(color, slice(None))) for color in colors]
+        planes = [self.x.device.get(self.signal(color, slice(None))) for color in colors]
+        return lambda color, rows: planes[color][rows]
 
     def _shift_rows(self, parts: dict[bool, Array], shifts: Array) -> dict[bool, Array]:
         """Return the waves of rows as photodetectors see them that are displaced by `shifts` [m].
@@ -269,9 +272,7 @@ class Filter:
                     total: Array | None = None
                     for plane, of_plane in zip(planes, values[:, colors], strict=True):
                         light = (
-                            shares[at] @ of_plane
-                            if few
-                            else product(shares[at], of_plane[0])[None]
+                            shares[at] @ of_plane if few else product(shares[at], of_plane[0])[None]
                         )
                         light *= plane
                         total = light if total is None else np.add(total, light, out=total)

@@ -261,7 +261,7 @@ def painted_on(
         def some(part: slice) -> None:
             paint(slice(rows.start + part.start, rows.start + part.stop), out[:, part])
 
-        paint_by_bands(some, *out.shape[1:], workers)
+        paint_by_bands(some, out.shape[1], out.shape[2], workers)
         brightest.append(np.maximum(out.max(axis=(1, 2)), -out.min(axis=(1, 2))))
 
     planes = _in_bands(device, (len(mix), *scene.shape), scene.dtype, fill)

@@ -1,6 +1,6 @@
 """From the rate of electrons to a raw frame on a device: `exposure.capture` with its numbers.
 
-The light comes from the processor, and what is read goes back there. What sense nodes show of
+Light comes from the processor's memory, and what is read goes back there. What sense nodes show of
 blooming and of interpixel capacitance is computed by the processor on the way.
 """
 

@@ -78,9 +78,7 @@ def device_cost(ready: Prepared, workers: int) -> DeviceCost:
     lattice, plan = ready.layout.lattice, ready.plan
     pixels, colors = lattice.rows * lattice.columns, len(ready.layout.mosaic.colors)
     work = filter_work(lattice, colors, ready.spectrum)
-    acting: tuple[ElectronEffect | Quantizer, ...] = of_kind(
-        plan.active, ElectronEffect, Quantizer
-    )
+    acting: tuple[ElectronEffect | Quantizer, ...] = of_kind(plan.active, ElectronEffect, Quantizer)
     moved = work.seconds + pixels * sum(effect.seconds_per_pixel for effect in acting)
     # Samples go there and light comes back; light goes there again, electrons and codes come back.
     copied = REAL * (work.samples + work.values) + PLACE * work.looks
