@@ -70,8 +70,6 @@ class OpticalPath:
     mosaic: Mosaic
     effects: tuple[Effect, ...]
     workers: int
-    device: Processor = PROCESSOR
-    """Where sampled scenes are transformed, filtered and evaluated at the pixels."""
     ceiling: float = np.inf
     """Rate that fills a pixel by the end of the exposure, inf where unknown; brighter ones all
     look alike [e/s]."""
@@ -87,6 +85,8 @@ class OpticalPath:
     """What acts on each layer of a scene, the nearest first; () where it is seen as flat."""
     has_opacity: bool = False
     """Whether it is that of a layer, half of whose colors are its opacity."""
+    device: Processor = PROCESSOR
+    """Where sampled scenes are transformed, filtered and evaluated at the pixels."""
 
     def with_effects(self, kept: Sequence[Effect]) -> OpticalPath:
         """Return the path with some of its effects alone.
