@@ -2,8 +2,8 @@
 
 Code of the hot path takes arrays of either kind: NumPy hands its functions to the library of the
 array (NEP 13 and NEP 18), so that an effect is written once. What that does not cover is a
-`Device`: new arrays, copies, random numbers, transforms, splines. `Processor` has NumPy's, `cuda.py`
-CuPy's. A copy between both is always written out, as `put` or `get`.
+`Device`: new arrays, copies, random numbers, transforms, splines. `Processor` has NumPy's,
+`cuda.py` CuPy's. A copy between both is always written out, as `put`, `get` or `fetch`.
 """
 
 from __future__ import annotations
