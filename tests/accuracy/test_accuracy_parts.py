@@ -53,7 +53,7 @@ def test_settings_of_the_same_computation_share_their_runs(tmp_path, monkeypatch
     taken = []
     whole = measurements.compute_frame
     monkeypatch.setattr(
-        measurements, "compute_frame", lambda c, workers: (taken.append(c), whole(c, workers))[1]
+        measurements, "compute_frame", lambda c, workers, _: (taken.append(c), whole(c, workers))[1]
     )
     clock = Clock(1)
     clock.timed_shot(own)
