@@ -4,6 +4,7 @@ The tests run in as many processes as there are cores: threads of BLAS would onl
 gets light that another one has brought.
 """
 
+import gc
 import os
 import sys
 
@@ -13,8 +14,22 @@ from hypothesis import settings
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+# Compiled modules and rewritten assertions are kept, whatever the environment says: without them a
+# worker starts in twice the time, and each of the commands that tests start as well.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+
 settings.register_profile("vcam", derandomize=True, database=None, deadline=None)
 settings.load_profile("vcam")
+
+
+def pytest_collection_finish() -> None:
+    """Spare the garbage collector what collection has made: a sixth of the time of small tests."""
+    gc.freeze()
+
+
+def pytest_unconfigure() -> None:
+    gc.unfreeze()
 
 
 @pytest.fixture(autouse=True)

@@ -19,6 +19,9 @@ from vcam_cli.characterization.datasheet import UNITS
 from vcam_cli.progress import Stages
 from vcam_cli.quality.mtf import crossing_frequency
 
+pytestmark = pytest.mark.long
+"""`test_kept_frames.py` has a small bench among the quick tests."""
+
 SHEET = {
     "scene.source": {"kind": "chart", "chart": "csf", "max_frequency": "50 lp/mm"},
     "scene.radiance": radiance_for(30000),
@@ -82,7 +85,6 @@ CLOSED = {
 that over the number; columns are 512 draws."""
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("name", CLOSED)
 def test_the_sheet_comes_back(name, sheet):
     known, tolerance = CLOSED[name]
@@ -93,7 +95,6 @@ EXACT = ("system_gain", "quantum_efficiency", "full_well", "read_noise", "dynami
          "snr_db", "dark_current", "dsnu")  # fmt: skip
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("name", EXACT)
 def test_the_closed_form_beside_it_is_the_sheet(name, sheet):
     assert sheet.get(name).expected == pytest.approx(CLOSED[name][0], rel=1e-3)
@@ -130,7 +131,6 @@ def diffraction(frequency, f_number):
 COMA = [{"field": 0, 8: "0 um"}, {"field": 1, 8: "0.4 um"}]
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("f_number", "changes"),
     [(2.8, {}), (5.6, {}), (11, {}), (22, {}), (5.6, {"optics.zernike": COMA})],

@@ -21,6 +21,7 @@ SPLIT = {
 }
 
 
+@pytest.mark.long
 def test_measured_snr_is_that_of_the_closed_form(tmp_path) -> None:
     """Five standard errors of a variance from 16 384 differences are 0.24 dB; none at a switch."""
     found = measure_merged_snr(camera(tmp_path, SPLIT), 2, Stages())

@@ -73,6 +73,7 @@ def test_json_has_the_measurement(ran):
     assert {"predicted", "measured", "ratio", "unit"} <= set(told["effects"][0])
 
 
+@pytest.mark.long
 def test_it_stands_beside_a_run_in_the_same_folder(tmp_path, monkeypatch):
     monkeypatch.setattr(measurements, "TURNS", 1)
     arguments = ["slanted-edge-f8", *SMALL, "--set", UNIFORM, "-o", str(tmp_path / "out"), "-q"]

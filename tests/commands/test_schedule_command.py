@@ -144,6 +144,7 @@ class TestShipped:
         assert "kind: schedule" in vcam("list", "studies", name).stdout
 
 
+@pytest.mark.long
 def test_each_without_frames_runs():
     for name in SHIPPED:
         text = shipped.find("studies", name).read_text("utf-8")

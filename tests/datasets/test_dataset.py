@@ -198,6 +198,7 @@ def test_every_frame_is_in_one_part_beside_those_of_its_light(tmp_path):
         assert max(map(len, found)) <= 64
 
 
+@pytest.mark.long
 def test_workers_kills_and_order_change_no_byte(many, tmp_path):
     """Two workers, killed as soon as a part is there; then again, to the end."""
     study, out = many

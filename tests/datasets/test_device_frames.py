@@ -100,7 +100,7 @@ def test_a_data_set_resumes(fake, study, tmp_path):
 
 
 def test_charts_take_their_light_one_by_one(fake, study, tmp_path):
-    charts = "scenes: {charts: [{kind: chart, chart: dead-leaves}], frames_each: 2}"
+    charts = "scenes: {charts: [{kind: chart, chart: step-wedge}], frames_each: 2}"
     text = SET.replace('scenes: {files: "*.png", frames_each: 2}', charts).replace("12", "4")
     study.write_text(text)
     said = []

@@ -4,6 +4,7 @@ import resource
 
 import numpy as np
 import pytest
+from making import long_except
 
 from vcam_cli import load, simulate
 from vcam_cli.errors import BadInput
@@ -56,11 +57,10 @@ def test_steps_of_wavelength_have_a_least_size():
         load("still-life", ["scene.wavelengths={step: 0.00001 nm}"])
 
 
-@pytest.mark.parametrize(
-    ("rows", "columns"), [(1, 1), (1, 7), pytest.param(13, 31, marks=pytest.mark.long)]
-)
-def test_tiny_and_prime_arrays(rows, columns):
+@pytest.mark.parametrize("shape", long_except([(1, 7)], [(1, 1), (1, 7), (13, 31)]), ids=str)
+def test_tiny_and_prime_arrays(shape):
     """A few pixels of leaves: thousands of them in every pixel, and in a margin far wider."""
+    rows, columns = shape
     sets = [f"array.rows={rows}", f"array.columns={columns}", "array.pattern=monochrome"]
     sets += ["processing=[{gamma: srgb}]", "quality=[mse]", "accuracy=draft"]
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from every import every
 from layered_reference import FOCAL, PITCH, Flat, Scene, changes, random_scene, ray_sum, write_exr
-from making import QUIET, camera, radiance_for
+from making import QUIET, camera, long_except, radiance_for
 from optical_paths import PITCH as PIXEL_PITCH
 from optical_paths import aperture, path, sensor
 
@@ -101,7 +101,7 @@ def test_covariance_of_stripes_is_that_of_their_waves():
     assert found == pytest.approx(-(mean[0] - mean[1] * mean[2]) / 8, abs=2e-4)
 
 
-@pytest.mark.parametrize("kind", ["rectangle", "half", "ramp"])
+@pytest.mark.parametrize("kind", long_except(["rectangle"], ["rectangle", "half", "ramp"]))
 def test_layers_out_of_focus_before_bars(kind, tmp_path):
     """Both out of focus: periodic backgrounds once fooled rings of points that agreed."""
     n = 16
@@ -130,6 +130,7 @@ def test_layers_out_of_focus_before_bars(kind, tmp_path):
     every([("draft", 0.02), ("standard", 0.005)], check)
 
 
+@pytest.mark.long
 def test_a_tighter_accuracy_is_never_worse(tmp_path):
     scene = random_scene(np.random.default_rng(4), 3)
     truth = ray_sum(scene, 3000, 4)
@@ -210,9 +211,8 @@ def stripes_by_rays(scene: Scene, pixels: int = 4) -> np.ndarray:
     return (light @ weight).reshape(pixels, 400).mean(axis=1)
 
 
-@pytest.mark.parametrize(
-    ("front", "back"), [(14, 12), pytest.param(20, 19, marks=pytest.mark.long)]
-)
+@pytest.mark.long
+@pytest.mark.parametrize(("front", "back"), [(14, 12), (20, 19)])
 def test_detail_that_blur_hides_is_not_missed(front, back, tmp_path):
     """Much finer than the blur, and hidden by the same: in their means there is nothing of it.
 
@@ -282,6 +282,7 @@ def wedge_before_star(speed: float) -> list[dict]:
     return [wedge, star]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("exposure", [{"exposure.time": "100 ms"}, {"exposure": {"auto": {}}}])
 def test_a_layer_may_move_far(exposure, tmp_path):
     """Beyond the frame, while it is exposed."""
@@ -294,6 +295,7 @@ def test_a_layer_may_move_far(exposure, tmp_path):
     assert frame.spectrum.depth.error <= 1.05 * made.accuracy.tolerance
 
 
+@pytest.mark.long
 def test_what_moving_layers_hide_is_the_mean_over_instants(tmp_path):
     """Against still frames of the layers at places along their paths."""
     scene = random_scene(np.random.default_rng(3), 2, sharp=False)
@@ -312,7 +314,7 @@ def test_what_moving_layers_hide_is_the_mean_over_instants(tmp_path):
     assert error <= 0.002
 
 
-@pytest.mark.parametrize("f_number", [1000, 3000])
+@pytest.mark.parametrize("f_number", long_except([1000], [1000, 3000]))
 def test_what_a_cut_margin_changes_is_predicted(f_number, tmp_path, monkeypatch):
     """Behind such a lens light comes from hundreds of arrays around: against so wide a margin."""
     found, predicted = [], []

@@ -91,7 +91,7 @@ CAMERAS = {
     "a picture that is judged": ("starter", [*LARGE, "quality=[s-cielab]"]),
     "a monochrome edge": ("slanted-edge-f8", LARGE),
 }
-QUICK = ("rectangles", "a wide margin", "captures")
+QUICK = ("rectangles", "a wide margin")
 PICTURES = {
     "as large as the array": ((1200, 1600), 0.0),
     "of another size": ((1000, 1400), 0.0),

@@ -4,9 +4,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 import raw_readers  # noqa: F401 - skips where the readers are not installed
 
 
+@pytest.mark.long
 def test_it_prints_bits_colors_and_seconds():
     command = [sys.executable, "-m", "tests.interchange", "--quick"]
     done = subprocess.run(

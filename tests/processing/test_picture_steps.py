@@ -83,7 +83,7 @@ def test_a_block_is_mirrored_at_the_border_of_the_picture_and_cut_at_no_other():
         np.testing.assert_allclose(inner, wanted[:, start:stop], atol=1e-6)
 
 
-SMALL = {"array.rows": 96, "array.columns": 128, "quality": ["mse"], "output.render": 8}
+SMALL = {"array.rows": 96, "array.columns": 64, "quality": ["mse"], "output.render": 8}
 BEFORE = [{"black_level": "subtract"}, {"demosaic": "bilinear"}, {"white_balance": "illuminant"}]
 
 
