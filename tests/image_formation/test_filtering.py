@@ -13,7 +13,7 @@ from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.estimates.bandwidth import axes
 from vcam_cli.image_formation.filtering import Filter, chebyshev
 from vcam_cli.image_formation.scene_spectrum import transform_planes
-from vcam_cli.image_formation.strategies import SMOOTH
+from vcam_cli.image_formation.strategies import PERIODS, SMOOTH
 from vcam_cli.image_formation.transfer_tables import Tables, TableSize, tabulate
 from vcam_cli.physics.diffraction import otf_circular
 
@@ -145,6 +145,34 @@ def test_stretches_cover_every_row_once():
         for part in parts:
             lowest, highest = part.min(), part.max()
             assert len(part) < filtering.SHORTEST or highest <= filtering.GROWTH * lowest + 1
+
+
+def test_a_stretch_is_short_enough_for_the_cusp_of_an_otf():
+    """At low frequencies an OTF loses a x |f|: along a line beside the origin a rounded cusp."""
+    at = np.linspace(1, filtering.GROWTH, 101)
+    nodes, weights = chebyshev(at)
+    for beside in np.geomspace(1e-3, 10, 60):
+        lost = np.hypot(beside, at)
+        assert np.abs(weights @ np.hypot(beside, nodes) - lost).max() <= 2e-5 * lost.max()
+
+
+def test_a_part_of_a_table_is_a_cubic_up_to_the_cut_off_of_a_lens():
+    """Of full contrast, along lines at any distance from the origin; worst at the cut-off."""
+    for low in np.linspace(0.02, 1.2, 120):
+        at = np.linspace(low, low + min(low * (filtering.GROWTH - 1), 1 / SMOOTH), 41)
+        nodes, weights = chebyshev(at)
+        for beside in (0.0, 0.02, 0.1, 0.3, 0.6, 0.9):
+            line, few = (otf_circular(np.hypot(beside, y), 1.0, 1.0) for y in (at, nodes))
+            assert np.abs(weights @ few - line).max() <= 5e-4
+
+
+def test_a_part_of_a_period_is_a_cubic():
+    """The error of a cubic through Chebyshev's nodes: (pi / 8)^4 / 192 of a wave."""
+    at = np.linspace(0, 1 / PERIODS, 101)
+    nodes, weights = chebyshev(at)
+    for phase in np.linspace(0, 1, 17):
+        few, wave = (np.cos(2 * np.pi * (t + phase)) for t in (nodes, at))
+        assert np.abs(weights @ few - wave).max() <= 1.3e-4
 
 
 @pytest.mark.parametrize("ends", [(3.0, 7.0), (7.0, 3.0)])

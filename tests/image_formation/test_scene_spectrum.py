@@ -1,17 +1,21 @@
 """Cosine spectra of samples and of even rectangles, against each other and against integrals."""
 
 from itertools import pairwise
+from types import SimpleNamespace
 
 import mpmath
 import numpy as np
 import pytest
 import scipy.fft
+import scipy.special
 from making import camera, radiance_for
 from optical_paths import rms
 
 from vcam_cli.accuracy_study.knobs import CONVERGED
 from vcam_cli.image_formation.closed_spectrum import (
     ProductSpectrum,
+    disc_waves,
+    product_spectrum,
     rectangle_spectrum,
     terms_of_runs,
 )
@@ -27,7 +31,7 @@ from vcam_cli.scenes.base import Frame, View
 from vcam_cli.scenes.charts.colorchecker import ColorChecker, largest_card, reflectances
 from vcam_cli.scenes.charts.slanted_edge import SlantedEdge
 from vcam_cli.scenes.charts.step_wedge import step_wedge
-from vcam_cli.scenes.closed_form import Rectangles
+from vcam_cli.scenes.closed_form import LightDisc, Rectangles
 from vcam_cli.scenes.framed import Framed, chart_scene
 from vcam_cli.scenes.layered import LayerChart, MaskedChart
 from vcam_cli.scenes.picture_chart import PictureChart
@@ -45,6 +49,46 @@ def scene(chart="colorchecker", oversampling=4, scene_width=None, margin=5):
         "slanted edge": SlantedEdge(0.1, 0.6),
     }
     return chart_scene(charts[chart], spectra, spectra[0], view)
+
+
+def test_the_table_of_a_disc_is_finer_than_its_waves():
+    """Straight lines between entries of 2 J1(z) / z: its curvature is 1/4 at most."""
+    axis = Axis(64, 1.0, 64, 1.0, 0.5, False, 0.4)
+    on = SimpleNamespace(extent=(64.0, 64.0), center=(0.0, 0.0))
+    for radius in (0.3, 3.3, 20.0):
+        disc = LightDisc(1.7, -2.9, radius, np.ones(1))
+        found = disc_waves(disc, on, (axis, axis))
+        f = axis.frequencies
+        z = 2 * np.pi * radius * np.hypot(f[:, None], f)
+        exact = np.divide(2 * scipy.special.j1(z), z, out=np.ones_like(z), where=z > 0)
+        waves = np.outer(found.down, found.along)
+        every = slice(None)
+        assert np.abs(found.terms(every, every) - exact * waves).max() <= 1e-5 * np.abs(waves).max()
+
+
+@pytest.mark.parametrize("terms", [64, 300])
+def test_edges_of_products_are_folded_by_no_cells(terms):
+    """Cells of a function of one variable fold next to nothing of an edge at any place.
+
+    Of an edge, whose term k is 1 / k, F cells fold the terms 2 m F - k and 2 m F + k onto it, each
+    (k / 2 m F)^2 of it: of 32 cells a term, all together, at most pi^2 / 3 / 64^2 = 8e-4.
+    """
+    length, axis = float(terms), Axis(terms, 1.0, terms, 1.0, 0.5, False, 0.5)
+    worst = 0.0
+    for place in np.random.default_rng(2).uniform(0.2, 0.8, 20) * length:
+
+        def products(y, x, mix, place=place):
+            cover = np.clip((place - length / 2 - x[:-1]) / np.diff(x), 0, 1)
+            return SimpleNamespace(down=np.ones((len(y) - 1, 1)), along=cover[None, None])
+
+        chart = SimpleNamespace(products=products)
+        on = SimpleNamespace(extent=(length, length), center=(0.0, 0.0), chart=chart)
+        found = product_spectrum(on, np.ones((1, 1)), (axis, axis), np.float64).along_x[0, 0]
+        k = np.arange(1, axis.terms)
+        envelope = 2 / np.pi * terms / k * np.sinc(k / (2 * terms))
+        error = found[1:] - envelope * np.sin(np.pi * k * place / length)
+        worst = max(worst, np.abs(error / envelope).max())
+    assert worst <= 8.1e-4
 
 
 @pytest.mark.parametrize("chart", ["colorchecker", "step wedge"])

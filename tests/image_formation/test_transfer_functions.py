@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vcam_cli.effects.optics.diffraction import Diffraction
-from vcam_cli.image_formation.transfer_functions import Band, transfer
+from vcam_cli.image_formation.transfer_functions import Band, Transfer, transfer
 from vcam_cli.image_formation.transfer_tables import TableSize, mixtures, tabulate
 from vcam_cli.spectra import PLANCK, SPEED_OF_LIGHT, Spectrum, illuminant
 
@@ -34,6 +34,18 @@ def test_a_line_is_its_own_otf():
     np.testing.assert_allclose(
         h.radial_response(F)[0, 0], level * LENS.otf(F, wavelength), rtol=1e-12
     )
+
+
+@pytest.mark.parametrize(("step", "kept"), [(20e-9, 4), (22e-9, 7), (50e-9, 7)])
+def test_wavelengths_are_halved_no_coarser_than_the_coarsest_band(step, kept):
+    """20 nm, at `draft`: light of lines further apart is not linear between them."""
+    wavelengths = 450e-9 + step * np.arange(7)
+    one = Transfer(wavelengths, np.ones((1, 1, 7)), (LENS,))
+    half = one.with_half_the_wavelengths()
+    assert len(half.wavelengths) == kept
+    assert half.weights.sum() == pytest.approx(7)
+    mean = (half.weights[0, 0] * half.wavelengths).sum() / 7
+    assert mean == pytest.approx(wavelengths.mean())
 
 
 @pytest.mark.parametrize(("step", "tolerance"), [(20e-9, 5e-4), (10e-9, 1.3e-4), (2.5e-9, 8e-6)])

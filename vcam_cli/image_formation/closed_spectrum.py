@@ -23,7 +23,7 @@ from vcam_cli.scenes.closed_form import LightDisc, Rectangles
 
 FINER = 32
 """Cells along an axis over the terms that are used, on which functions of one variable are
-averaged: what they fold is at most 2e-4 of an edge's own terms, and they cost nothing."""
+averaged: what they fold is at most 8e-4 of an edge's own terms, and they cost nothing."""
 
 
 def closed_spectrum(

@@ -28,7 +28,7 @@ NODES = 4
 """Frequencies at which a stretch of rows has its transfer function computed."""
 GROWTH = 1.5
 """Highest over lowest frequency of a stretch: an OTF has a cusp at 0. The cubic through Chebyshev
-nodes then errs by 1e-4 of what the OTF has lost up to there."""
+nodes then errs by 1e-5 of what the OTF has lost up to there."""
 FEW = 1 << 14
 """Terms of a piece up to which all colors are filtered in one call: frames of 64 x 64 pixels, whose
 pieces have some hundred terms, take two thirds of the time."""

@@ -71,9 +71,10 @@ from vcam_cli.scenes.layered import AnyScene, LayeredScene
 from vcam_cli.scenes.waves import WaveScene
 
 SMOOTH = 16
-"""Parts of a table; over each part it is a cubic, to rounding."""
+"""Parts of a table; over each part a perfect lens is a cubic: to 4e-4 of full contrast at its
+cut-off."""
 PERIODS = 8
-"""Parts of a period of a blur's phase over which it is a cubic."""
+"""Parts of a period of a blur's phase over which it is a cubic, to 1.3e-4 of its waves."""
 
 
 def image_layers(path: OpticalPath, scene: AnyScene) -> tuple[Layers, SpectrumReport]:

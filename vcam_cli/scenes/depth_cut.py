@@ -17,6 +17,7 @@ guess, the picture's mirror image at the edge, estimates its error.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -30,9 +31,8 @@ MOST_LAYERS = 256
 """Layers of a picture, at most."""
 FINEST = 2e-5
 """Error of the cuts below which no more layers are made, rms, relative to full signal."""
-BETWEEN = 0.73
-"""Rms over all places between two layers of an error that is largest in the middle: of
-4 t (1 - t), sqrt(8 / 15)."""
+BETWEEN = math.sqrt(8 / 15)
+"""Rms over all places between two layers of an error that is largest in the middle, 4 t (1 - t)."""
 LEAST_JUMP = 0.1
 """Difference of blur radii above which one sample hides another [pixels]."""
 STEPS = 24

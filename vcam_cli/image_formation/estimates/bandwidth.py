@@ -47,7 +47,7 @@ RESOLVED = 256
 """Periods of the highest frequency within which the tail of a line is integrated; farther away it
 is that of a cusp: see `line_spread_tail`."""
 LOWEST = 0.02
-"""Lowest frequency at which a spectrum may end [pixel Nyquist]."""
+"""Lowest frequency at which a spectrum may end [pixel Nyquist]: below it no time is saved."""
 HIGHEST = 64.0
 """Highest frequency that is considered where no lens ends the spectrum [pixel Nyquist]."""
 KINKS = 4.0

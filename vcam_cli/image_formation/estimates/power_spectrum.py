@@ -21,10 +21,8 @@ from vcam_cli.image_formation.scene_spectrum import SceneSpectrum, pairs
 from vcam_cli.image_formation.transfer_tables import Tables, reader
 from vcam_cli.parallel import product
 
-ALONE = 16
-"""Lowest terms along an axis that are blocks of their own."""
 WIDTH = 1 / 20
-"""Width of a block relative to its frequency."""
+"""Width of a block relative to its frequency: the lowest 40 terms are blocks of their own."""
 
 
 @dataclass(frozen=True)
@@ -90,8 +88,7 @@ def blocks(axis: Axis) -> Blocks:
 @lru_cache(1 << 7)
 def _starts(terms: int) -> Array:
     """Return the first terms of blocks whose width grows with the frequency."""
-    starts = [*range(min(ALONE, terms))]
-    at = len(starts)
+    starts, at = [], 0
     while at < terms:
         starts.append(at)
         at += max(1, int(at * WIDTH))
