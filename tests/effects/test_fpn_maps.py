@@ -117,6 +117,7 @@ def test_an_image_and_an_array_hold_the_same(tmp_path):
     assert simulate(from_exr).electrons.std() > 7
 
 
+@pytest.mark.long
 def test_the_bench_measures_them(tmp_path):
     """DSNU and PRNU of `characterize` are the spread of the maps: EMVA 1288 has them of the array
     [e] and of its mean; 5 % is the noise of its frames."""

@@ -164,6 +164,7 @@ def test_mistakes_are_said_with_a_remedy(change, said):
     assert "optics" in str(error.value)
 
 
+@pytest.mark.long
 def test_a_run_notes_what_it_ignores_and_its_report_has_the_lens(tmp_path):
     from lenses.test_lens_files import HEAD, SURFACES
 

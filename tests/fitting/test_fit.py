@@ -160,6 +160,7 @@ def test_tails_bands_and_defects_are_found(tmp_path):
     assert load(tmp_path / "found.yaml").pixel.readout.correlated_row_noise.correlation < 1
 
 
+@pytest.mark.long
 def test_traps_and_shading_are_found(tmp_path):
     """Each within five standard errors; the other noise is as it would be without them."""
     known = blind.truth(102)
@@ -189,6 +190,7 @@ def test_traps_and_shading_are_found(tmp_path):
     assert told.fpn.shading.gain == pytest.approx(0.02, rel=0.1)
 
 
+@pytest.mark.long
 def test_dark_current_over_temperature(tmp_path):
     """Doubled every 7 K: within five standard errors; verify predicts the warm frames."""
     known = blind.truth(103)

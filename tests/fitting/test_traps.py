@@ -21,7 +21,10 @@ def drawn(seed, fraction=0.03, step=9.0, occupancy=0.35, frames=N):
     return np.rint(100 + noise + steps * (rng.random(shape) < occupancy)).astype(np.uint16)
 
 
-@pytest.mark.parametrize(("fraction", "step", "occupancy"), [(0.03, 9.0, 0.35), (0.01, 20.0, 0.8)])
+@pytest.mark.parametrize(
+    ("fraction", "step", "occupancy"),
+    [(0.03, 9.0, 0.35), pytest.param(0.01, 20.0, 0.8, marks=pytest.mark.long)],
+)
 def test_traps_are_found_with_their_errors(fraction, step, occupancy):
     """Within five standard errors, which are 15 % at most; the others' variance to 2 %."""
     found = find_traps([pixel_moments(drawn(1, fraction, step, occupancy), GOOD)])

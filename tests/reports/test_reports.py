@@ -89,7 +89,7 @@ def test_a_page_of_every_part_is_valid_and_escapes_what_it_shows():
 @pytest.mark.parametrize(
     ("name", "sets"),
     [
-        ("still-life", []),
+        pytest.param("still-life", [], marks=pytest.mark.long),
         pytest.param("x3-stacked", [], marks=pytest.mark.long),
         ("starter", ["optics=none"]),
         ("starter", ["adc={bits: 10, kind: logarithmic}", "output.render=none", "quality=[]"]),
@@ -204,6 +204,7 @@ def test_runs_side_by_side(runs, tmp_path):
     assert (again.exit_code, again.stdout) == (0, "")
 
 
+@pytest.mark.long
 def test_a_page_in_the_folder_of_a_run_leaves_it_a_runs(tmp_path):
     """Before and after a run that writes a report of its own, and in the folder of a sweep."""
     place = tmp_path / "run"
@@ -248,6 +249,7 @@ def test_a_folder_that_was_changed_is_refused(runs, tmp_path):
     assert "not as this version of vcam writes it" in broken.stderr
 
 
+@pytest.mark.long
 def test_a_sweep_has_a_report_of_its_tables_and_plots(tmp_path):
     out = tmp_path / "out"
     words = ["sweep", "exposure-and-noise", "-q", "--workers", 1, "-o", out]

@@ -215,8 +215,14 @@ MASKED = {
     [
         ("40 um", {}),
         ("-60 um", {}),
-        ("40 um", {"array.pattern": "bayer-rggb", "scene.illuminant": "D65"}),
-        ("-40 um", {"pixel.phase_detection": {"dual": {"separation": "60 %"}}}),
+        pytest.param(
+            *("40 um", {"array.pattern": "bayer-rggb", "scene.illuminant": "D65"}),
+            marks=pytest.mark.long,
+        ),
+        pytest.param(
+            *("-40 um", {"pixel.phase_detection": {"dual": {"separation": "60 %"}}}),
+            marks=pytest.mark.long,
+        ),
         ("60 um", MASKED),
     ],
 )

@@ -80,6 +80,7 @@ def test_spectral_irradiance_of_a_file_counts_as_it_is(tmp_path):
     assert result.mean_electrons == pytest.approx(photons * AREA * 0.5 * 0.01, rel=1e-6)
 
 
+@pytest.mark.long
 def test_the_irradiance_behind_a_lens_can_be_laid_on_a_bare_sensor(tmp_path):
     """irradiance.exr of one camera is the scene of another, which sees as much.
 

@@ -127,6 +127,7 @@ def test_every_point_is_in_one_share(groups, of):
     assert sorted(flat) == sorted(job for group in made for job in group)
 
 
+@pytest.mark.long
 def test_killed_at_any_moment_and_started_again(long, tmp_path):
     study, expected = long
     out = tmp_path / "out"
@@ -145,6 +146,7 @@ def test_killed_at_any_moment_and_started_again(long, tmp_path):
     assert tables(out) == expected
 
 
+@pytest.mark.long
 def test_two_processes_share_a_folder(long, tmp_path):
     study, expected = long
     out = tmp_path / "out"
@@ -160,7 +162,8 @@ def test_two_processes_share_a_folder(long, tmp_path):
     assert tables(out) == expected
 
 
-@pytest.mark.parametrize("first", [1, pytest.param(2, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("first", [1, 2])
 def test_shares_that_finish_at_once_lose_no_row(first, tmp_path, monkeypatch):
     """One share computes and writes while the other, which began before it, is on its last point.
 
@@ -356,6 +359,7 @@ def test_the_best_of_words(tmp_path):
 
 
 class TestWorkers:
+    @pytest.mark.long
     def test_one_that_dies_is_replaced_and_its_point_done_again(self, tmp_path, monkeypatch):
         study = written(tmp_path, **LONG)
         started = []
@@ -432,6 +436,7 @@ class TestWorkers:
         assert workers.processes_and_threads(None, 2) == (2, 4)
 
 
+@pytest.mark.long
 def test_the_machinery_costs_little(tmp_path, monkeypatch):
     """Processor time of everything but the frames: less than 20 ms a point."""
     study = written(tmp_path, vary={"pixel.readout.read_noise": {
