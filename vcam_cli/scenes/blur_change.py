@@ -180,7 +180,8 @@ def squares_factor(pitch: float, loss: BlurLoss) -> Array:
 
 
 SHELLS = 64
-"""Frequencies that a grid cannot tell apart which are summed; beyond, an integral bounds them."""
+"""Frequencies that a grid cannot tell apart which are summed; beyond, an integral bounds them. With
+any number it is a bound; more make it tighter."""
 
 
 def rectangle_bounds(

@@ -118,8 +118,7 @@ def readouts_in(page: Page) -> tuple[str, ...]:
         return ()
     with open_image(page.path) as source:
         names = source.spec().channelnames
-    found = (name.removeprefix("dn.") for name in names if name.startswith("dn."))
-    return tuple(name for name in found if name == "small" or name.startswith("gain"))
+    return tuple(name.removeprefix("dn.") for name in names if name.startswith("dn."))
 
 
 def _check_pixels(count: int, each: int = 8) -> None:
