@@ -159,8 +159,11 @@ CAMERAS = {
     | PATCHES,
 }
 EVERY = pytest.mark.parametrize(
-    "name", long_except(CAMERAS.keys() - {"letters near, a star far away"}, CAMERAS)
+    "name",
+    long_except(CAMERAS.keys() - {"letters near, a star far away"}, CAMERAS),
+    scope="module",
 )
+"""Of the whole module: all tests of a camera run together, in one process, and share its frames."""
 
 
 def decisions(result) -> dict[str, Decision]:
@@ -259,6 +262,7 @@ def test_noise_is_weighed_at_levels_of_the_raw_frame(kind, tmp_path):
     np.testing.assert_allclose(result.frame.plan.levels, expected, rtol=1e-6)
 
 
+@pytest.mark.long
 def test_the_cameras_put_the_promises_to_the_test(run):
     """What the plan may leave out it leaves out of one camera, and keeps in another.
 
@@ -343,7 +347,8 @@ def test_all_is_on_for_everything_described(run):
     """No camera has all effects: a ccd has no reset noise, and no shutter that rolls."""
     everything = set()
     for name in ("all traces", "a ccd in stray light", MOVING, LAYERED):
-        result = run(name, effects="all")
+        small = {"array.rows": 12, "array.columns": 16, "accuracy": "draft"}
+        result = run(name, effects="all", **small)
         described = [d.name for d in result.frame.plan.decisions if d.by != "camera"]
         assert [e.name for e in result.frame.plan.active] == described
         assert {d.by for d in result.frame.plan.decisions} == {"user", "camera"}
