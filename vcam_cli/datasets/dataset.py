@@ -17,6 +17,7 @@ from pathlib import Path
 from threading import Lock
 from typing import Any, Self, overload
 
+from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.datasets import manifest
 from vcam_cli.datasets.dataset_file import DatasetFile
 from vcam_cli.datasets.device_frames import batch_key
@@ -92,7 +93,10 @@ def dataset(
         packing = opened.enter_context(_Packing(folder))
         parts = _Parts(folder, packer, packing, whole, execution.fresh, versions["code"])
         left = [shard for shard in mine if not parts.is_packed(shard)]
-        groups = [g for shard in left for g in _groups(file, shard, versions, execution.device)]
+        size = geometry(file.camera)
+        pixels = size.rows * size.columns
+        given = versions, pixels, execution.device
+        groups = [group for shard in left for group in _groups(file, shard, *given)]
         sizes = {part.id: len(part.numbers) for shard in left for part in shard.parts}
         if execution.device != "cpu" and batch_key(file.frame(0), file.model.write) is None:
             tell("frames take their light from the processor, one by one")
@@ -269,14 +273,16 @@ TOGETHER = 64
 """Parts of a group, at most: a worker keeps to it."""
 
 
-def _groups(file: DatasetFile, shard: Shard, versions: dict[str, str], device: str) -> list[_Group]:
+def _groups(
+    file: DatasetFile, shard: Shard, versions: dict[str, str], pixels: int, device: str
+) -> list[_Group]:
     """Return the parts of a shard; those that begin with one picture together, it is read once."""
     found: list[_Group] = []
     scene: Any = None
     for part in shard.parts:
         own = file.frame(part.numbers[0]).scene
         if not found or own is not scene or len(found[-1].parts) == TOGETHER:
-            found.append(_Group(file, shard, versions, device, []))
+            found.append(_Group(file, shard, versions, pixels, device, []))
         found[-1].parts.append(part)
         scene = own
     return found
@@ -289,6 +295,7 @@ class _Group(Sequence[FramesJob]):
     file: DatasetFile
     shard: Shard
     versions: dict[str, str]
+    pixels: int
     device: str
     parts: list[Part]
 
@@ -304,7 +311,7 @@ class _Group(Sequence[FramesJob]):
             return [self[number] for number in range(*index.indices(len(self)))]
         part, model = self.parts[index], self.file.model
         lit = tuple(tuple(map(self.file.frame, numbers)) for numbers in part.lit)
-        about = self.file.base, model.write, self.versions, self.device
+        about = self.file.base, model.write, self.versions, self.pixels, self.device
         return FramesJob(part.id, lit, self.shard.frames, *about)
 
 

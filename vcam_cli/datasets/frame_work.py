@@ -19,7 +19,7 @@ from vcam_cli.effects.signal_chain import NoiseSource
 from vcam_cli.errors import BadInput
 from vcam_cli.files.frame_archive import archive_bytes, array_hash
 from vcam_cli.image_formation.rate_cache import RateCache
-from vcam_cli.parallel import ThreadPool
+from vcam_cli.parallel import ThreadPool, suitable_workers
 from vcam_cli.physics.cache import ByteCache
 from vcam_cli.quality.photon_transfer import ROUNDING
 from vcam_cli.readout.chain import ReadoutChain
@@ -74,12 +74,15 @@ class FramesJob:
     """The data set's camera file."""
     write: tuple[str, ...]
     versions: dict[str, str]
+    pixels: int
+    """Pixels of a frame."""
     device: str = "cpu"
 
     def compute(self, threads: int, shared: Shared) -> tuple[dict[str, float], dict[str, bytes]]:
         """Return no metrics, and the archive of the frames' arrays and records."""
         if shared.rate_cache.limit != LIGHT:
             shared.rate_cache, shared.pictures = RateCache(LIGHT), ByteCache(PICTURES)
+        threads = min(threads, suitable_workers(self.pixels))
         arrays: dict[str, Array] = {}
         records: dict[str, Record] = {}
         known: list[tuple[Frame, Camera]] = []

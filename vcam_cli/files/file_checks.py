@@ -52,11 +52,12 @@ def is_raw(path: Path) -> bool:
     return path.suffix.lower() in RAW_SUFFIXES
 
 
-def check_file(path: Path) -> None:
-    """Refuse what is no whole regular file, before OpenImageIO sees it."""
+def check_file(path: Path) -> os.stat_result:
+    """Return the state of a file; refuse what is no whole regular one, before OpenImageIO."""
     status = check_regular(path)
     if not _is_whole(path, status.st_size, status.st_ctime_ns, status.st_ino):
         raise truncated_file()
+    return status
 
 
 @lru_cache(1024)

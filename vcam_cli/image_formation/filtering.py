@@ -9,8 +9,8 @@ share.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -34,6 +34,9 @@ FEW = 1 << 14
 pieces have some hundred terms, take two thirds of the time."""
 SHORTEST = 8
 """Rows below which every row has its own transfer function."""
+KEPT = 1 << 16
+"""Terms of a filter up to which its pieces are kept, some 1 MB: pictures before one lens have it in
+common, and frames of 64 x 64 pixels of a data set take a tenth less."""
 
 Waves = tuple[bool, bool]
 """Whether waves along x, and along y, are sines."""
@@ -117,6 +120,22 @@ class _Ones:
 
 
 @dataclass(frozen=True)
+class _Rows:
+    """Rows of a spectrum that are filtered together, and their transfer function, a cubic in fy."""
+
+    part: slice
+    """Which of the terms."""
+    index: Array | slice
+    """Rows of the DCT-II coefficients behind them."""
+    count: int
+    """Terms along x."""
+    shares: Array
+    """Weights (n, nodes) of the nodes in every row."""
+    values: Array
+    """Transfer (R, C, nodes, count) at the nodes [e/s]."""
+
+
+@dataclass(frozen=True, eq=False)
 class Filter:
     """A transfer function acting on the cosine series of a scene."""
 
@@ -128,6 +147,10 @@ class Filter:
     along_y: Array
     cubic_range: float
     """Frequency range over which the tables are a cubic [cycles/m]."""
+    _kept: dict[tuple[object, ...], list[tuple[slice, list[_Rows]]]] = field(
+        default_factory=dict, init=False, repr=False
+    )
+    """Parity, waves along y, piece and type -> rows of the piece, by where they fold to."""
 
     def apply(self, spectrum: SceneSpectrum, workers: int) -> Series:
         """Filter a spectrum and fold it onto the rows of photodetectors.
@@ -201,7 +224,8 @@ class Filter:
             one = replace(self, tables=alone)
             for rows in pieces(self.y.folded_terms, LONGEST):
                 for _, terms, weights in self.y.folding(rows):
-                    for part, colors, light in one._filter_rows(ones, table, terms, weights):
+                    every = one._rows(table, terms, weights, ones.dtype)
+                    for part, colors, light in one._filter_rows(ones, every):
                         yield mixture, colors, terms[part], light
 
     @property
@@ -216,7 +240,6 @@ class Filter:
         """Add what the planes give through one parity of the tables to the pixels' waves."""
         odd_x, odd_y = PARITIES[parity]
         dtype = spectrum.dtype
-        table = reader(self.tables, parity, self.x.frequencies)
         shape = self.tables.colors, self.y.folded_terms, self.x.folded_terms
         for wave_y, share_y in self.y.pixel_waves(odd_y):
             targets = []
@@ -231,10 +254,8 @@ class Filter:
                 share_y: Array | None = share_y,
                 targets: list[tuple[Array, bool, Array | None]] = targets,
             ) -> None:
-                for target, terms, weights in self.y.folding(rows, wave_y):
-                    if share_y is not None:
-                        weights = weights * share_y[terms]
-                    for part, colors, light in self._filter_rows(spectrum, table, terms, weights):
+                for target, some_rows in self._piece(parity, wave_y, share_y, rows, dtype):
+                    for part, colors, light in self._filter_rows(spectrum, some_rows):
                         here = slice(target.start + part.start, target.start + part.stop)
                         for sums, wave_x, share_x in targets:
                             some = light if share_x is None else light * share_x[: light.shape[2]]
@@ -244,14 +265,34 @@ class Filter:
             threads = 1 if self._device.whole else workers
             each(multiply, pieces(self.y.folded_terms, LONGEST), threads)
 
-    def _filter_rows(
-        self, spectrum: SceneSpectrum, table: TableReader, terms: Array, weights: Array
-    ) -> Iterator[tuple[slice, slice, Array]]:
-        """Yield rows of the filtered spectrum: (which of `terms`, colors, (colors, n, count)).
+    def _piece(
+        self, parity: int, wave_y: bool, share_y: Array | None, rows: slice, dtype: np.dtype
+    ) -> list[tuple[slice, list[_Rows]]]:
+        """Return where a piece of the folded axis comes from: its part, and the rows added to it.
 
-        `terms` (n,) are consecutive rows, rising or falling; `weights` are factors on them.
+        share_y: how much of `wave_y` is in every term; None for all.
         """
-        dtype, device = spectrum.dtype, self._device
+        key = parity, wave_y, rows.start, rows.stop, dtype
+        if key in self._kept:
+            return self._kept[key]
+        table = reader(self.tables, parity, self.x.frequencies)
+        found = []
+        for target, terms, weights in self.y.folding(rows, wave_y):
+            if share_y is not None:
+                weights = weights * share_y[terms]
+            found.append((target, list(self._rows(table, terms, weights, dtype))))
+        if self.x.terms * self.y.terms <= KEPT:
+            self._kept[key] = found
+        return found
+
+    def _rows(
+        self, table: TableReader, terms: Array, weights: Array, dtype: np.dtype
+    ) -> Iterator[_Rows]:
+        """Yield terms (n,) as rows that are filtered together.
+
+        They are consecutive rows, rising or falling; `weights` are factors on them.
+        """
+        device = self._device
         factor = self._weights_x
         below = weights * self.y.coefficient_index(terms)[1] * self.y.weights[terms]
         below = below * self.along_y[terms]
@@ -264,20 +305,34 @@ class Filter:
             shares = device.put(shares * below[stretch, None], dtype)
             values = device.put(table.values(nodes, count) * factor[:count], dtype)
             longest = LONGEST if device.whole else rows_at_once(count)
-            for rows in slices_within(stretch, longest):
-                planes = self._rows(spectrum, terms[rows], count)
-                at = slice(rows.start - stretch.start, rows.stop - stretch.start)
-                few = device.whole or (rows.stop - rows.start) * count <= FEW
-                for colors in pieces(self.tables.colors, self.tables.colors if few else 1):
-                    total: Array | None = None
-                    for plane, of_plane in zip(planes, values[:, colors], strict=True):
-                        light = (
-                            shares[at] @ of_plane if few else product(shares[at], of_plane[0])[None]
-                        )
-                        light *= plane
-                        total = light if total is None else np.add(total, light, out=total)
-                    assert total is not None
-                    yield rows, colors, total
+            for part in slices_within(stretch, longest):
+                index = _consecutive(self.y.coefficient_index(terms[part])[0])
+                if not isinstance(index, slice):
+                    index = device.put(index)
+                at = slice(part.start - stretch.start, part.stop - stretch.start)
+                yield _Rows(part, index, count, shares[at], values)
+
+    def _filter_rows(
+        self, spectrum: SceneSpectrum, some: Iterable[_Rows]
+    ) -> Iterator[tuple[slice, slice, Array]]:
+        """Yield rows of the filtered spectrum: (which of the terms, colors, (colors, n, count))."""
+        every = range(len(spectrum))
+        for rows in some:
+            planes = [
+                self.x.extend(spectrum.rows(plane, rows.index, rows.count), rows.count)
+                for plane in every
+            ]
+            few = self._device.whole or len(rows.shares) * rows.count <= FEW
+            for colors in pieces(self.tables.colors, self.tables.colors if few else 1):
+                total: Array | None = None
+                for plane, of_plane in zip(planes, rows.values[:, colors], strict=True):
+                    light = (
+                        rows.shares @ of_plane if few else product(rows.shares, of_plane[0])[None]
+                    )
+                    light *= plane
+                    total = light if total is None else np.add(total, light, out=total)
+                assert total is not None
+                yield rows.part, colors, total
 
     @cached_property
     def _weights_x(self) -> Array:
@@ -296,14 +351,6 @@ class Filter:
                 size = SHORTEST - 1
             yield slice(start, min(start + size, count))
             start += size
-
-    def _rows(self, spectrum: SceneSpectrum, terms: Array, count: int) -> list[Array]:
-        """Return rows of every plane's spectrum without factors: R of (n, count)."""
-        index = _consecutive(self.y.coefficient_index(terms)[0])
-        if not isinstance(index, slice):
-            index = self._device.put(index)
-        planes = range(len(spectrum))
-        return [self.x.extend(spectrum.rows(plane, index, count), count) for plane in planes]
 
     def _count(self, fy: Array) -> int:
         """Return the terms along x that the tables reach at some of these frequencies along y."""

@@ -50,7 +50,8 @@ from vcam_cli.image_formation.field_dependence import (
     filtered_layers,
     tabulate_field,
 )
-from vcam_cli.image_formation.filtering import Filter
+from vcam_cli.image_formation.cosine_series import Axis
+from vcam_cli.image_formation.filtering import KEPT, Filter
 from vcam_cli.image_formation.harmonic_scenes import (
     harmonic_layers,
     harmonics_count,
@@ -63,6 +64,7 @@ from vcam_cli.image_formation.profile_scenes import profile_layers
 from vcam_cli.image_formation.spot_average import spot_averages
 from vcam_cli.image_formation.sub_exposures import sub_exposed_layers, sub_exposed_motion
 from vcam_cli.image_formation.transfer_tables import Tables, mixtures, tabulate
+from vcam_cli.physics.cache import remembered
 from vcam_cli.physics.ray_spot import RaySpot
 from vcam_cli.scenes.base import ChartScene, HarmonicScene, SampledScene
 from vcam_cli.scenes.depth_scene import DepthScene
@@ -261,7 +263,9 @@ def _spectral_layers(
         is_sheared=any(path.drift),
         terms=image_filter.terms,
         planes=len(tables.mix),
-        changes=changes_by_omission(path, image, tables, field_change),
+        changes=(
+            changes_by_omission(path, image, tables, field_change) if path.is_explained else {}
+        ),
         filters=len(tables.parities) * (1 + len(modes)),
         table_values=sum(plane.size for plane in planes),
         peak=image.peak,
@@ -310,11 +314,24 @@ def _filter(path: OpticalPath, scene: SampledScene, tables: Tables, highest: flo
     `highest` is in pixel Nyquist frequencies.
     """
     x, y = axes(path, scene, highest)
+    # What is kept is small: no planes, and pieces of few terms.
+    made = _kept_filter if tables.is_radial and x.terms * y.terms <= KEPT else _made_filter
+    return made(x, y, tables, path.separable, reach(path))
+
+
+def _made_filter(
+    x: Axis, y: Axis, tables: Tables, separable: tuple[SeparableTransfer, ...], widest: float
+) -> Filter:
+    """Return the filter of tables and separable blurs; `widest` [m] as `reach` returns it."""
     along_x, along_y = np.ones(x.terms), np.ones(y.terms)
-    for effect in path.separable:
+    for effect in separable:
         along_x *= effect.along_x(x.frequencies)
         along_y *= effect.along_y(y.frequencies)
-    smooth, widest = tables.top / SMOOTH, reach(path)
+    smooth = tables.top / SMOOTH
     if widest > 0:
         smooth = min(smooth, 1 / (PERIODS * widest))
     return Filter(x, y, tables, along_x, along_y, smooth)
+
+
+_kept_filter = remembered(16)(_made_filter)
+"""Filters of pictures before one lens, by how far up their spectra count."""

@@ -18,6 +18,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.effects.blurs import Blur, PlaneTransfer
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.parallel import product
+from vcam_cli.physics.cache import ByteCache
 
 PARITIES = ((False, False), (True, True), (True, False), (False, True))
 """Whether a transfer function turns the cosines along x, and along y, into sines."""
@@ -63,7 +64,7 @@ Mixing = tuple[Array, float]
 """Mixtures (R, K) of a scene's components, and the largest relative error that they leave."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Tables:
     """Transfer functions H_rc of R mixtures of the scene's components, in C colors.
 
@@ -97,6 +98,16 @@ class Tables:
     def colors(self) -> int:
         """Number of colors."""
         return self.shape[1]
+
+    @property
+    def is_radial(self) -> bool:
+        """Whether no blur has a direction: such tables are small."""
+        return all(plane is None for plane in self.planes)
+
+    @property
+    def nbytes(self) -> int:
+        """Memory that they take [bytes]."""
+        return sum(part.nbytes for part in (self.radial, *self.planes) if part is not None)
 
     def of_color(self, color: int) -> Tables:
         """Return the tables of a single color.
@@ -268,6 +279,18 @@ def tabulate(exact: Transfer, size: TableSize, mixing: Mixing) -> Tables:
     Tables
         The tables of the mixtures.
     """
+    if exact.key is None:
+        return _tabulated(exact, size, mixing)
+    key = exact.key, size, mixing[0].tobytes(), mixing[1]
+    return _TABLES.get(key, lambda: _tabulated(exact, size, mixing))
+
+
+_TABLES: ByteCache[Tables] = ByteCache(1 << 22, strict=True)
+"""Tables of the last lenses. Those of one lens are the same object, so that what follows from them
+is known, too: `strategies.picture_filter`."""
+
+
+def _tabulated(exact: Transfer, size: TableSize, mixing: Mixing) -> Tables:
     mix, error = mixing
     mixed = exact.with_mixtures(mix)
     tables = Tables(mix, radial_table(mixed, size), size.top, error)

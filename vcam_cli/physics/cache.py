@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
+from functools import lru_cache, wraps
 from threading import Lock
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, ParamSpec, Protocol, TypeVar
 
 
 class _Sized(Protocol):
@@ -14,6 +15,42 @@ class _Sized(Protocol):
 
 
 T = TypeVar("T", bound=_Sized)
+Arguments = ParamSpec("Arguments")
+Returned = TypeVar("Returned")
+
+
+def remembered(
+    count: int,
+) -> Callable[[Callable[Arguments, Returned]], Callable[Arguments, Returned]]:
+    """Return a decorator that keeps the last results of a pure function, by equal arguments.
+
+    Arguments without a hash, such as arrays, are computed with each time.
+
+    Parameters
+    ----------
+    count : int
+        Number of results.
+
+    Returns
+    -------
+    callable
+        The decorator; results are shared, and not to be changed.
+    """
+
+    def decorate(function: Callable[Arguments, Returned]) -> Callable[Arguments, Returned]:
+        kept = lru_cache(count)(function)
+
+        @wraps(function)
+        def call(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Returned:
+            try:
+                hash((args, tuple(kwargs.values())))
+            except TypeError:
+                return function(*args, **kwargs)
+            return kept(*args, **kwargs)
+
+        return call
+
+    return decorate
 
 
 class ByteCache(Generic[T]):

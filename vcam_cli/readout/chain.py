@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Protocol, Self
 
 import numpy as np
@@ -228,7 +229,7 @@ class ReadoutChain:
         steps = dict(self.circuit.black_steps)
         return np.array([steps.get(color, 0.0) for color in colors])
 
-    @property
+    @cached_property
     def saturated_dn(self) -> float:
         """The lowest code of a saturated pixel: of a full well, or the ADC's highest [DN].
 

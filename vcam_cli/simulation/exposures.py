@@ -58,7 +58,7 @@ def exposures(
     fills_first = min(solved, key=lambda each: rate_of_full(seen, each))
     if fills_first is not first:
         seen = exposed_as(seen, fills_first, picture)
-    seen = replace(seen, path=replace(seen.path, optional=()))
+    seen = replace(seen, path=replace(seen.path, optional=(), is_explained=False))
     seen, light = formed_light(seen, picture, run)
     for number, each in enumerate(solved):
         if wanted is not None and number not in wanted:

@@ -7,10 +7,12 @@ that a JPEG ends too early, and refuse what is no picture of light (CMYK, CIELAB
 values).
 """
 
+import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -106,34 +108,49 @@ def color_channels(
     """Return the number of channels that `read_picture` gives, by the header; raise the same."""
     path = Path(path)
     with convert_errors(path, yaml_path, _CONVERT):
-        _check_picture(path)
-        with open_image(path) as source:
-            return len(_header(source.spec(), channels)[0])
+        return _shape(path, _check_picture(path), channels)[2]
 
 
 def picture_size(path: Path | str, yaml_path: tuple[str | int, ...] | str) -> tuple[int, int]:
     """Return rows and columns of what `read_picture` gives, by the header; raise the same."""
     path = Path(path)
     with convert_errors(path, yaml_path, _CONVERT):
-        _check_picture(path)
-        with open_image(path) as source:
-            spec = source.spec()
-            _header(spec, _RGB)
-            size = spec.height, spec.width
-            if source.format_name() == "openexr":
-                size = spec.full_height, spec.full_width
-            is_turned = 5 <= spec.get_int_attribute("Orientation", 1) <= 8
-            return size[::-1] if is_turned else size
+        return _shape(path, _check_picture(path), _RGB)[:2]
 
 
-def _check_picture(path: Path) -> None:
-    """Refuse what is no whole regular file, and raw files of cameras. Raise UnusableFile."""
-    check_file(path)
+def _shape(path: Path, status: os.stat_result, channels: tuple[str, ...]) -> tuple[int, int, int]:
+    """Return rows, columns and channels of a picture, by its header."""
+    return _shape_in_state(path, status.st_size, status.st_ctime_ns, status.st_ino, channels)
+
+
+@lru_cache(1024)  # crops of one picture: 2 % of a frame of 64 x 64 pixels of a data set
+def _shape_in_state(
+    path: Path, size: int, changed: int, inode: int, channels: tuple[str, ...]
+) -> tuple[int, int, int]:
+    """Return the shape of a picture; its header is read once in each state of the file."""
+    del size, changed, inode
+    with open_image(path) as source:
+        spec = source.spec()
+        count = len(_header(spec, channels)[0])
+        shape = spec.height, spec.width
+        if source.format_name() == "openexr":
+            shape = spec.full_height, spec.full_width
+        is_turned = 5 <= spec.get_int_attribute("Orientation", 1) <= 8
+        return (*(shape[::-1] if is_turned else shape), count)
+
+
+def _check_picture(path: Path) -> os.stat_result:
+    """Return the state of a file; refuse what is no whole regular file, and raw files of cameras.
+
+    Raise UnusableFile.
+    """
+    status = check_file(path)
     if is_raw(path):
         raise UnusableFile(
             "is a raw file: a camera's codes, not light",
             "develop it with a raw converter, and give a 16-bit TIFF with its color profile",
         )
+    return status
 
 
 @contextmanager

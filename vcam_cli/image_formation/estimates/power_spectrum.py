@@ -25,7 +25,7 @@ WIDTH = 1 / 20
 """Width of a block relative to its frequency: the lowest 40 terms are blocks of their own."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Blocks:
     """Blocks of neighboring terms along one axis."""
 
@@ -44,6 +44,7 @@ class Blocks:
         return (self.low + self.high) / 2
 
 
+@lru_cache(64)
 def blocks(axis: Axis) -> Blocks:
     """Return the blocks of the terms of an axis.
 
@@ -138,7 +139,7 @@ class PowerSpectrum:
         """
         power = np.zeros((tables.colors, len(self.y.low), len(self.x.low)))
         for parity in tables.parities:
-            values = reader(tables, parity, self.x.center).values(self.y.center)
+            values = _at_centers(tables, parity, self.x, self.y)
             for (r, s), squares in zip(pairs(self.planes), self.products, strict=True):
                 power += values[r] * values[s] * squares
         return np.maximum(power, 0)
@@ -173,7 +174,7 @@ class PowerSpectrum:
         Array
             Mean squares (C, blocks along y, blocks along x) [(e/s)^2].
         """
-        values = np.abs(reader(tables, 0, self.x.center).values(self.y.center))
+        values = np.abs(_at_centers(tables, 0, self.x, self.y))
         own = [p for (r, s), p in zip(pairs(self.planes), self.products, strict=True) if r == s]
         amplitudes = values * np.sqrt(np.maximum(own, 0))[:, None]
         return self.pixel_power(np.square(amplitudes.sum(axis=0)))
@@ -255,18 +256,42 @@ class PowerSpectrum:
         Pixels cannot tell apart a term of each zone between multiples of their Nyquist frequency:
         within a zone mean squares add up, those of zones as if all of them met in phase.
         """
-        along_y, along_x = 2 * pitch[0] * self.y.high, 2 * pitch[1] * self.x.high
-        frequency, shell = np.unique(np.maximum(along_y[:, None], along_x), return_inverse=True)
-        zones = [np.maximum(np.ceil(at - 1e-6), 1).astype(int) - 1 for at in (along_y, along_x)]
-        count = int(zones[1].max()) + 1
-        zone = zones[0][:, None] * count + zones[1]
-        bins = zone.ravel() * len(frequency) + shell.ravel()
-        size = (int(zones[0].max()) + 1) * count * len(frequency)
+        frequency, bins, zones = _shells(self.x, self.y, pitch)
+        size = zones * len(frequency)
         left = []
         for color in power.reshape(len(power), -1):
             of_zones = np.bincount(bins, color, size).reshape(-1, len(frequency))
             left.append(np.sqrt(np.cumsum(of_zones[:, ::-1], axis=1)[:, ::-1]).sum(axis=0))
         return frequency, np.array(left)
+
+
+def _at_centers(tables: Tables, parity: int, x: Blocks, y: Blocks) -> Array:
+    """Return tables in the middle of the blocks (R, C, blocks along y, blocks along x) [e/s]."""
+    read = _read_radial if tables.is_radial else _read_tables
+    return read(tables, parity, x, y)
+
+
+def _read_tables(tables: Tables, parity: int, x: Blocks, y: Blocks) -> Array:
+    return reader(tables, parity, x.center).values(y.center)
+
+
+_read_radial = lru_cache(4)(_read_tables)
+"""Values of one lens are the same for all pictures of a size."""
+
+
+@lru_cache(4)
+def _shells(x: Blocks, y: Blocks, pitch: tuple[float, float]) -> tuple[Array, Array, int]:
+    """Return frequencies (n,) [pixel Nyquist], each block's zone and shell, the number of zones.
+
+    A block (blocks along y, blocks along x), flat, is in the bin zone * n + shell.
+    """
+    along_y, along_x = 2 * pitch[0] * y.high, 2 * pitch[1] * x.high
+    frequency, shell = np.unique(np.maximum(along_y[:, None], along_x), return_inverse=True)
+    zones = [np.maximum(np.ceil(at - 1e-6), 1).astype(int) - 1 for at in (along_y, along_x)]
+    count = int(zones[1].max()) + 1
+    zone = zones[0][:, None] * count + zones[1]
+    bins = zone.ravel() * len(frequency) + shell.ravel()
+    return frequency, bins, (int(zones[0].max()) + 1) * count
 
 
 def _largest(transfer: Callable[[Array], Array], blocks: Blocks) -> Array:
