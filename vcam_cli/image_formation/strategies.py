@@ -27,6 +27,7 @@ from vcam_cli.effects.blurs import Blur, FieldTransfer, RadialTransfer, Separabl
 from vcam_cli.effects.warps import Warp
 from vcam_cli.floats import rms
 from vcam_cli.image_formation.box_average import box_averages, point_values
+from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.estimates import memory_model
 from vcam_cli.image_formation.estimates.bandwidth import (
     HIGHEST,
@@ -50,7 +51,6 @@ from vcam_cli.image_formation.field_dependence import (
     filtered_layers,
     tabulate_field,
 )
-from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.filtering import KEPT, Filter
 from vcam_cli.image_formation.harmonic_scenes import (
     harmonic_layers,

@@ -13,6 +13,7 @@ that are separable in x and y (the pixel aperture) are kept apart: they multiply
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -23,7 +24,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.blurs import Blur, PlaneTransfer, RadialTransfer
 from vcam_cli.parallel import pieces, product
-from vcam_cli.physics.cache import ByteCache
+from vcam_cli.physics.cache import ByteCache, remembered
 from vcam_cli.spectra import Spectrum, pair_weights, photons
 
 VALUES = 1 << 17
@@ -243,12 +244,13 @@ class Transfer:
     def cutoff(self) -> float:
         """Frequency above which every H_kc is zero [cycles/m]; inf without such a frequency."""
         used = self.wavelengths[np.abs(self.weights).sum(axis=(0, 1)) > 0]
-        if not len(used):
-            return 0.0
-        return min(
-            (max(effect.cutoff(float(w)) for w in used) for effect in self.effects),
-            default=np.inf,
-        )
+        return _cutoff(self.effects, tuple(used.tolist())) if len(used) else 0.0
+
+
+@remembered(8)
+def _cutoff(effects: tuple[Blur, ...], wavelengths: tuple[float, ...]) -> float:
+    """Return the frequency above which blurs pass nothing of any wavelength [cycles/m]."""
+    return min((max(map(effect.cutoff, wavelengths)) for effect in effects), default=math.inf)
 
 
 def transfer(

@@ -46,7 +46,7 @@ def remembered(
                 hash((args, tuple(kwargs.values())))
             except TypeError:
                 return function(*args, **kwargs)
-            return kept(*args, **kwargs)
+            return kept(*args, **kwargs)  # type: ignore[arg-type]  # they have a hash
 
         return call
 

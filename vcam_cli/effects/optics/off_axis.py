@@ -24,6 +24,7 @@ from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.pixel_signal import Gain, NeutralGain
 from vcam_cli.floats import rms
 from vcam_cli.physics import radiometry
+from vcam_cli.physics.cache import remembered
 
 ENTRIES = 1 << 17
 """Of the table of a measured falloff."""
@@ -82,36 +83,38 @@ class OffAxis(NeutralGain):
         x2 = ((x / self.image_distance) ** 2).astype(x.dtype)
         y2 = ((y / self.image_distance) ** 2).astype(y.dtype)
         tan2 = x2[None, :] + y2[:, None]
-        if tan2.dtype == np.float64 or self._polynomial is None:
+        polynomial = None if tan2.dtype == np.float64 else _polynomial(self)
+        if polynomial is None:
             return self._relative_illumination(tan2).astype(tan2.dtype)
-        out: Array = np.full_like(tan2, self._polynomial[-1])
-        for coefficient in self._polynomial[-2::-1]:
+        out: Array = np.full_like(tan2, polynomial[-1])
+        for coefficient in polynomial[-2::-1]:
             out *= tan2
             out += coefficient
         return out
-
-    @cached_property
-    def _polynomial(self) -> tuple[np.float32, ...] | None:
-        """Coefficients in tan^2(phi), rising, to 1e-7 up to the corner; None where 12 are too few.
-
-        Why: the exact form costs ten passes in 64 bits over every pixel, this one a few in 32.
-        """
-        top = (self.corner / self.image_distance) ** 2 * 1.001
-        dense = np.linspace(0, top, 257)
-        exact = self._relative_illumination(dense)
-        for degree in range(1, 13):
-            series = np.polynomial.Chebyshev.interpolate(
-                self._relative_illumination, degree, [0, top]
-            )
-            if np.abs(series(dense) - exact).max() < 1e-7:
-                return tuple(series.convert(kind=np.polynomial.Polynomial).coef.astype(np.float32))
-        return None
 
     def mean_error(self, signal: SignalLevels) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         radius2 = _quadrant(self.half_width, self.half_height)
         loss = 1 - self._relative_illumination(radius2 / self.image_distance**2)
         return 1.002 * rms(loss) * signal.full_signal
+
+
+@remembered(4)
+def _polynomial(falloff: OffAxis) -> tuple[np.float32, ...] | None:
+    """Return coefficients in tan^2(phi), rising, to 1e-7 up to the corner; None for more than 12.
+
+    Why: the exact form costs ten passes in 64 bits over every pixel, this one a few in 32.
+    """
+    top = (falloff.corner / falloff.image_distance) ** 2 * 1.001
+    dense = np.linspace(0, top, 257)
+    exact = falloff._relative_illumination(dense)
+    for degree in range(1, 13):
+        series = np.polynomial.Chebyshev.interpolate(
+            falloff._relative_illumination, degree, [0, top]
+        )
+        if np.abs(series(dense) - exact).max() < 1e-7:
+            return tuple(series.convert(kind=np.polynomial.Polynomial).coef.astype(np.float32))
+    return None
 
 
 @dataclass(frozen=True)
