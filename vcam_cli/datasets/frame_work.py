@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
+from itertools import chain
 
 import numpy as np
 
@@ -50,6 +52,10 @@ ARRAYS: dict[str, Callable[[Photograph], Array]] = {
 """Kind of array -> what it is of a frame."""
 
 
+Made = tuple[dict[str, float], dict[str, Array]]
+"""Labels of a frame, and its arrays by their kind."""
+
+
 @dataclass(frozen=True)
 class Record:
     """Labels and hashes of a frame, or its error."""
@@ -84,55 +90,64 @@ class FramesJob:
             shared.rate_cache, shared.pictures = RateCache(LIGHT), ByteCache(PICTURES)
         threads = min(threads, suitable_workers(self.pixels))
         arrays: dict[str, Array] = {}
-        records: dict[str, Record] = {}
+        entries: dict[str, Callable[[], Record]] = {}
+        with ThreadPool(HASHERS) as pool:
+            on_device = self.device != "cpu"  # which goes on while threads hash
+            for frame, made in chain(self._batched(), self._single(threads, shared)):
+                name = str(frame.number)
+                if isinstance(made, BadInput):
+                    entries[name] = partial(Record, error=error_cell(made.problems))
+                    continue
+                told, own = made
+                arrays |= {f"{name}.{kind}": values for kind, values in own.items()}
+                hashes: dict[str, Callable[[], str]] = {
+                    kind: pool.submit(array_hash, values).result
+                    if on_device
+                    else partial(array_hash, values)
+                    for kind, values in own.items()
+                }
+                entries[name] = partial(_record, told, hashes)
+            records = {name: entry() for name, entry in entries.items()}
+        return {}, {NPZ: archive_bytes(arrays, {RECORDS: write_records(records).encode()})}
+
+    def _batched(self) -> Iterator[tuple[Frame, Made | BadInput]]:
+        """Yield the frames that batches on a device compute, or why they cannot be."""
+        batches: dict[str, list[Frame]] = {}
+        for frame in (frame for frames in self.lit for frame in frames):
+            key = batch_key(frame, self.write) if self.device != "cpu" else None
+            if frame.number in self.numbers and key is not None:
+                batches.setdefault(key, []).append(frame)
+        for frames in batches.values():
+            left = {frame.number: frame for frame in frames}
+            try:
+                device = open_device(self.device)
+                taken = device_frames(frames[0], self.write, self.base, device).take(frames)
+                for frame, taker, raw, clean, seconds, gain in taken:
+                    camera, own = taker.at_gain(gain), {"raw": raw, "clean": clean}
+                    given = camera.solved, camera.chain, camera.effects, seconds, raw
+                    del left[frame.number]
+                    yield frame, (noise_labels(*given), {kind: own[kind] for kind in self.write})
+            except BadInput as error:
+                yield from ((frame, error) for frame in left.values())
+
+    def _single(self, threads: int, shared: Shared) -> Iterator[tuple[Frame, Made | BadInput]]:
+        """Yield all other frames, light by light, or why they cannot be."""
         known: list[tuple[Frame, Camera]] = []
-        if self.device != "cpu":
-            self._take_batches(arrays, records)
         for frames in self.lit:
             wanted = [
-                n
-                for n, frame in enumerate(frames)
-                if frame.number in self.numbers and str(frame.number) not in records
+                number
+                for number, frame in enumerate(frames)
+                if frame.number in self.numbers
+                and (self.device == "cpu" or batch_key(frame, self.write) is None)
             ]
             if not wanted:
                 continue
             for frame, result in self._results(frames, wanted, known, threads, shared):
                 if isinstance(result, BadInput):
-                    records[str(frame.number)] = Record(error=error_cell(result.problems))
-                    continue
-                own = {kind: ARRAYS[kind](result) for kind in self.write}
-                hashes = {kind: array_hash(values) for kind, values in own.items()}
-                records[str(frame.number)] = Record(labels(result), hashes)
-                arrays |= {f"{frame.number}.{kind}": values for kind, values in own.items()}
-        return {}, {NPZ: archive_bytes(arrays, {RECORDS: write_records(records).encode()})}
-
-    def _take_batches(self, arrays: dict[str, Array], records: dict[str, Record]) -> None:
-        """Add what batches on a device compute of the frames; hashes are made by threads."""
-        device = open_device(self.device)
-        batches: dict[str, list[Frame]] = {}
-        for frame in (frame for frames in self.lit for frame in frames):
-            key = batch_key(frame, self.write)
-            if frame.number in self.numbers and key is not None:
-                batches.setdefault(key, []).append(frame)
-        with ThreadPool(HASHERS) as pool:
-            for frames in batches.values():
-                left, hashing = {frame.number for frame in frames}, []
-                try:
-                    taken = device_frames(frames[0], self.write, self.base, device).take(frames)
-                    for frame, taker, raw, clean, seconds, gain in taken:
-                        camera, own = taker.at_gain(gain), {"raw": raw, "clean": clean}
-                        given = camera.solved, camera.chain, camera.effects, seconds, raw
-                        own = {kind: own[kind] for kind in self.write}
-                        hashes = {kind: pool.submit(array_hash, own[kind]) for kind in own}
-                        hashing.append((str(frame.number), noise_labels(*given), hashes))
-                        arrays |= {f"{frame.number}.{kind}": own[kind] for kind in own}
-                        left.discard(frame.number)
-                except BadInput as error:
-                    said = error_cell(error.problems)
-                    records |= {str(number): Record(error=said) for number in left}
-                for name, told, hashes in hashing:
-                    known = {kind: found.result() for kind, found in hashes.items()}
-                    records[name] = Record(told, known)
+                    yield frame, result
+                else:
+                    own = {kind: ARRAYS[kind](result) for kind in self.write}
+                    yield frame, (labels(result), own)
 
     def _results(
         self,
@@ -174,6 +189,10 @@ class FramesJob:
                 yield frames[number], simulate(every, threads, shared=shared, device=self.device)
             except BadInput as error:
                 yield frames[number], error
+
+
+def _record(told: dict[str, float], hashes: Mapping[str, Callable[[], str]]) -> Record:
+    return Record(told, {kind: found() for kind, found in hashes.items()})
 
 
 def write_records(records: Mapping[str, Record]) -> str:
