@@ -73,7 +73,7 @@ def compute_points(jobs: Sequence[Task], threads: int, shared: Shared) -> list[O
     behind the last of every batch: modules are loaded where they are first needed.
     """
     try:
-        if _AGREED != [jobs[0].versions]:
+        if [jobs[0].versions] != _AGREED:
             _check_versions(jobs[0])
         outcomes = [_compute_point(job, threads, shared) for job in jobs]
         _check_versions(jobs[0])
