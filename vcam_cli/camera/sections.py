@@ -6,8 +6,9 @@ long to validate.
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Callable, Sequence, Set
 from dataclasses import replace
+from functools import lru_cache
 
 from pydantic import ValidationError
 
@@ -18,6 +19,14 @@ from vcam_cli.config.model import Model
 from vcam_cli.config.parts import Findings
 from vcam_cli.config.yaml_tree import Origin
 from vcam_cli.errors import BadInput
+
+
+@lru_cache(64)
+def _checks_of(
+    sections: frozenset[str], checks: tuple[Check[Camera], ...]
+) -> list[Callable[[Camera], None]]:
+    """Return the checks that read any of the sections."""
+    return [check for check, read in checks if sections & set(read.split())]
 
 
 def with_sections(
@@ -63,9 +72,8 @@ def with_sections(
         )
         if camera.scene.wavelengths.outside != known.scene.wavelengths.outside:
             return None
-        for check, read in (*FORMAT.checks, *checks):
-            if sections & set(read.split()):
-                check(camera)
+        for check in _checks_of(frozenset(sections), (*FORMAT.checks, *checks)):
+            check(camera)
     except (ValidationError, BadInput):
         return None
     tree = replace(origin.tree, value=given | part.mapping)

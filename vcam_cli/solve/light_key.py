@@ -81,7 +81,7 @@ objects, and to write all of them is 3 % of a frame of 64 x 64 pixels of a data 
 
 
 def _section_form(camera: Camera, name: str) -> LightForm:
-    """Return a section of a camera as YAML has it, without `INDEPENDENT_KEYS`; not to be changed."""
+    """Return a section of a camera as YAML has it, without `INDEPENDENT_KEYS`, shared."""
     section, known = getattr(camera, name), _SECTIONS.get(name)
     if known is None or known[0] is not section:
         form = camera.model_dump(mode="json", include={name})
