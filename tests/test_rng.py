@@ -1,9 +1,22 @@
 """Streams: equal keys give equal numbers, different keys do not, blocks cover the array."""
 
+import hashlib
+
 import numpy as np
 import pytest
 
 from vcam_cli.rng import BLOCK_ROWS, blocks, coarse_normals, stream
+
+
+@pytest.mark.parametrize("block", [0, 3, 1 << 40])
+def test_a_stream_is_philox_of_its_key(block):
+    """As NumPy opens it, key and counter handed in."""
+    digest = hashlib.blake2b(b"vcam 7 read_noise 2", digest_size=16).digest()
+    key = int.from_bytes(digest, "little")
+    plain = np.random.Generator(np.random.Philox(key=key, counter=[0, 0, 0, block]))
+    found = stream(7, "read_noise", 2, block)
+    assert np.array_equal(found.standard_normal(100), plain.standard_normal(100))
+    assert found.integers(2**63) == plain.integers(2**63)
 
 
 def test_equal_keys_give_equal_numbers():

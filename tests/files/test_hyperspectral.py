@@ -102,7 +102,7 @@ class TestSpectralExr:
         path = made.spectral_exr(tmp_path / "e.exr", emissiveUnits="W.m^-2.nm^-1")
         falling = read_cube(path, "scene")[0]
         assert falling.bands.quantity == "irradiance"
-        np.testing.assert_allclose(falling.data * np.pi, light.data, rtol=3e-7)
+        np.testing.assert_allclose(falling.data[:] * np.pi, light.data[:], rtol=3e-7)
 
     def test_refuses_light_and_reflectance_at_once(self, tmp_path):
         path = made.exr(tmp_path / "a.exr", ["S0.400nm", "T.400nm"], CUBE[:, :, :2])
@@ -571,6 +571,56 @@ class TestTiff:
         refused(path)
 
 
+class TestStrips:
+    """Files of many rows whose rows are read by themselves, and those that are read whole."""
+
+    TALL = np.tile(CUBE, (60, 1, 1)) + np.arange(240, dtype=np.float32)[:, None, None]
+    CODES = TALL.astype(np.uint16)
+
+    def test_rows_of_an_exr(self, tmp_path):
+        path = made.exr(tmp_path / "a.exr", [f"T.{nm:g}nm" for nm in NM], self.TALL)
+        self.is_in_strips(path, self.TALL)
+
+    @pytest.mark.parametrize("order", "CF")
+    def test_rows_of_an_npz(self, order, tmp_path):
+        path = tmp_path / "a.npz"
+        np.savez(path, wavelength_nm=NM, reflectance=np.asarray(self.TALL, order=order))
+        self.is_in_strips(path, self.TALL)
+
+    @pytest.mark.parametrize("compression", ["none", "zlib"])
+    @pytest.mark.parametrize("strip", [1, 7, 32])
+    @pytest.mark.parametrize("layout", ["contig", "separate", "pages"])
+    def test_rows_of_a_tiff(self, layout, strip, compression, tmp_path):
+        tifffile = pytest.importorskip("tifffile")
+        shown = np.moveaxis(self.CODES, 2, 0)
+        how = {"photometric": "minisblack", "rowsperstrip": strip, "compression": compression}
+        if layout == "contig":
+            shown = self.CODES
+        if layout != "pages":
+            how["planarconfig"] = layout
+        tifffile.imwrite(tmp_path / "a.tif", np.ascontiguousarray(shown), **how)
+        (tmp_path / "a.csv").write_text(made.table())
+        self.is_in_strips(tmp_path / "a.tif", self.CODES)
+
+    def test_what_is_packed_as_a_whole_is_read_whole(self, tmp_path):
+        tifffile = pytest.importorskip("tifffile")
+        how = {"photometric": "minisblack", "planarconfig": "contig", "compression": "zlib"}
+        tifffile.imwrite(tmp_path / "a.tif", self.CODES, rowsperstrip=240, **how)
+        (tmp_path / "a.csv").write_text(made.table())
+        np.savez_compressed(tmp_path / "a.npz", wavelength_nm=NM, reflectance=self.TALL)
+        for name, cube in (("a.tif", self.CODES), ("a.npz", self.TALL)):
+            holds(tmp_path / name, cube=cube)
+            assert isinstance(read_cube(tmp_path / name, ())[0].data, np.ndarray)
+
+    @staticmethod
+    def is_in_strips(path, cube):
+        holds(path, cube=cube)
+        data = read_cube(path, ())[0].data
+        assert isinstance(data, StoredSamples)
+        for rows in (slice(0, 3), slice(37, 101), slice(239, 240)):
+            np.testing.assert_allclose(data[rows], cube[rows], rtol=2.5e-7)
+
+
 class TestValues:
     def write(self, tmp_path, cube, quantity="reflectance"):
         return made.npz(tmp_path / "a.npz", wavelength_nm=NM, **{quantity: cube})
@@ -618,7 +668,8 @@ class TestValues:
         holds(path, cube=CUBE[:, :, ::-1])
 
     def test_memory_is_asked_for_first(self, tmp_path, monkeypatch):
-        path = self.write(tmp_path, CUBE)
+        path = tmp_path / "packed.npz"
+        np.savez_compressed(path, wavelength_nm=NM, reflectance=CUBE)
         monkeypatch.setattr(memory, "available", lambda: 900)
         refused(path, "need", "GB of memory", kind=CannotDo)
 

@@ -201,6 +201,22 @@ def test_same_bytes_for_any_number_of_workers():
     assert frames[0] == frames[1] == frames[2]
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_a_filter_that_is_used_again_gives_the_same(dtype):
+    """Its pieces are kept from the first picture to the next ones, of either type."""
+    x, y = GRIDS["fine chart"]
+    table, random = tables(2, 3, 0.8), np.random.default_rng(4)
+    kept = filter_of(x, y, table)
+    for _ in range(3):
+        planes = random.random((2, y.samples, x.samples)).astype(dtype)
+        found, alone = (
+            some.apply(transform_planes(planes.copy(), 1), 1).signal(1, slice(None))
+            for some in (kept, filter_of(x, y, table))
+        )
+        assert found.tobytes() == alone.tobytes()
+    assert kept._kept
+
+
 def test_uniform_light_stays_uniform():
     x, y = GRIDS["odd ratio"]
     spectrum = transform_planes(np.full((1, y.samples, x.samples), 0.7), 1)

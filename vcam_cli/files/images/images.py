@@ -306,21 +306,26 @@ def check_size(spec: Any, channels: int) -> None:
 
 
 def read_samples(
-    source: Any, spec: Any, chosen: tuple[int, ...], page: int = 0
+    source: Any,
+    spec: Any,
+    chosen: tuple[int, ...],
+    page: int = 0,
+    rows: tuple[int, int] | None = None,
 ) -> tuple[np.ndarray, list[str]]:
     """Return the chosen channels as stored, integers as they are, else as float32; and notes.
 
     Whole numbers of an EXR are numbers as its others are, and no codes: they come as float32.
-    spec: the header of the page, by default the first of several images in the file.
+    spec: the header of the page, by default the first of several images in the file; rows: from
+    one to another alone, of a file without tiles.
     """
     kinds = {_READ_AS.get(str(spec.channelformat(index))) for index in chosen}
     kind = kinds.pop() if len(kinds) == 1 else None
     name = "float" if kind is None else _OIIO_NAMES.get(kind, np.dtype(kind).name)
     first, last = min(chosen), max(chosen) + 1
     if source.format_name() == "openexr" and (kind or kinds):
-        data = _read_numbers(source, spec, page, first, last)
+        data = _read_numbers(source, spec, page, first, last, rows)
     else:
-        data = source.read_image(page, 0, first, last, name)
+        data = _read_channels(source, spec, page, first, last, name, rows)
     reason = pending_error(source.geterror)
     if data is None or (reason and "extraneous bytes" not in reason):
         raise _unsupported(None, reason) or truncated_file()
@@ -329,16 +334,57 @@ def read_samples(
     return (data if order == list(range(last - first)) else data[:, :, order]), notes
 
 
-def _read_numbers(source: Any, spec: Any, page: int, first: int, last: int) -> np.ndarray | None:
+def _read_channels(
+    source: Any,
+    spec: Any,
+    page: int,
+    first: int,
+    last: int,
+    name: str,
+    rows: tuple[int, int] | None,
+) -> np.ndarray | None:
+    """Return channels as numbers of a type (n, w, channels); None where the file ends."""
+    if rows is None:
+        whole: np.ndarray | None = source.read_image(page, 0, first, last, name)
+        return whole
+    # Whole strips of a TIFF: to other rows OpenImageIO unpacks all those before.
+    strip = _strip(spec)
+    top, bottom = rows[0] // strip * strip, min(-(-rows[1] // strip) * strip, spec.height)
+    ends = spec.y + top, spec.y + bottom
+    found = source.read_scanlines(page, 0, *ends, 0, first, last, name)
+    if found is None:
+        return None
+    shaped = np.asarray(found).reshape(bottom - top, spec.width, last - first)
+    return shaped[rows[0] - top : rows[1] - top]
+
+
+def _read_numbers(
+    source: Any, spec: Any, page: int, first: int, last: int, rows: tuple[int, int] | None
+) -> np.ndarray | None:
     """Return channels of an EXR, whole numbers not scaled to fractions; None where it ends."""
-    out = np.empty((spec.height, spec.width, last - first), np.float32)
+    height = spec.height if rows is None else rows[1] - rows[0]
+    out = np.empty((height, spec.width, last - first), np.float32)
     for channel in range(first, last):
         name = "uint" if str(spec.channelformat(channel)) in _READ_AS else "float"
-        data = source.read_image(page, 0, channel, channel + 1, name)
+        data = _read_channels(source, spec, page, channel, channel + 1, name, rows)
         if data is None:
             return None
-        out[:, :, channel - first] = data.reshape(spec.height, spec.width)
+        out[:, :, channel - first] = data.reshape(height, spec.width)
     return out
+
+
+def is_in_strips(spec: Any) -> bool:
+    """Return whether rows of an image can be read by themselves: it has no tiles, and no window."""
+    whole = (spec.full_x, spec.full_y, spec.full_width, spec.full_height)
+    has_window = whole != (spec.x, spec.y, spec.width, spec.height)
+    return spec.tile_width == 0 and not has_window and _strip(spec) <= _BLOCK
+
+
+def _strip(spec: Any) -> int:
+    """Return the rows that a file packs together, where it matters which of them are read."""
+    if spec.get_string_attribute("compression", "none") == "none":
+        return 1
+    return max(1, int(spec.get_int_attribute("tiff:RowsPerStrip", 1)))
 
 
 def extract_display_window(data: np.ndarray, spec: Any, notes: list[str]) -> np.ndarray:

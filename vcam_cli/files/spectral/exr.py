@@ -24,6 +24,7 @@ from vcam_cli.files.images.exr import ExrWriter
 from vcam_cli.files.images.images import (
     check_size,
     extract_display_window,
+    is_in_strips,
     open_image,
     read_samples,
 )
@@ -116,17 +117,20 @@ def open_spectral(path: Path, wavelengths: Mapping[str, float] | None = None) ->
         white = _white(spec.get_string_attribute(WHITE), len(found), quantity)
         if spec.get_float_attribute("EV", 0.0) != 0.0:
             notes.append("its exposure compensation (EV) is not used")
+        in_strips = is_in_strips(spec)
         if source.seek_subimage(1, 0):
             notes.append("only the first of several images in the file is used")
+    read = partial(_read, path, tuple(index for _, index in found))
     return SpectralData(
         shape=(spec.full_height, spec.full_width),
         wavelengths=np.array([wavelength for wavelength, _ in found]),
         quantity=quantity,
-        read=lambda: _read(path, tuple(index for _, index in found)),
+        read=read,
         gain=GAINS[quantity],
         white=white,
         notes=tuple(notes),
         copies=1,
+        read_rows=(lambda start, stop: read((start, stop))) if in_strips else None,
     )
 
 
@@ -202,8 +206,9 @@ def _quantity(units: str) -> Quantity:
     return "radiance"
 
 
-def _read(path: Path, chosen: tuple[int, ...]) -> np.ndarray:
+def _read(path: Path, chosen: tuple[int, ...], rows: tuple[int, int] | None = None) -> np.ndarray:
     notes: list[str] = []
     with open_image(path) as source:
         spec = source.spec()
-        return extract_display_window(read_samples(source, spec, chosen)[0], spec, notes)
+        found, _ = read_samples(source, spec, chosen, rows=rows)
+        return extract_display_window(found, spec, notes) if rows is None else found

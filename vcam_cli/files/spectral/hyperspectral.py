@@ -110,10 +110,12 @@ def read_cube(
     not suffice.
     """
     with _open_bands(Path(path), yaml_path, names) as (stored, order):
-        data, notes = _si_samples(stored, order)
-        copies = stored.copies if stored.read_rows is None else 0
-        found = Cube(data, _bands(stored, order), copies * data.nbytes)
-        return found, (*stored.notes, *notes)
+        samples = _place(stored, order)
+        data, notes = _si_samples(stored, order, samples)
+        beside = 0
+        if stored.read_rows is None:
+            beside = stored.copies * data.nbytes + samples.beside
+        return Cube(data, _bands(stored, order), beside), (*stored.notes, *notes)
 
 
 def companions(path: Path | str) -> tuple[Path, ...]:
@@ -200,13 +202,14 @@ def _check_size(path: Path, stored: SpectralData) -> None:
         )
 
 
-def _si_samples(stored: SpectralData, order: Order) -> tuple[np.ndarray | StoredSamples, list[str]]:
+def _si_samples(
+    stored: SpectralData, order: Order, samples: _Place
+) -> tuple[np.ndarray | StoredSamples, list[str]]:
     """Return the samples in SI units, float32, checked block by block, and notes.
 
     Samples whose rows can be read by themselves stay in the file.
     """
     shape = (*stored.shape, len(stored.wavelengths[order]))
-    samples = _place(stored, order)
     wavelengths = stored.wavelengths[order]
     bands = np.shape(stored.wavelengths)
     gain, offset = (np.broadcast_to(v, bands)[order] for v in (stored.gain, stored.offset))
@@ -261,6 +264,11 @@ class _Place:
     """Values (h, w, bands) as the file has them."""
     si: np.ndarray
     """Where those in SI units go: the same memory where they fit in."""
+
+    @property
+    def beside(self) -> int:
+        """Memory of the values as the file has them, where it is not that of the others [bytes]."""
+        return 0 if self.stored is self.si else self.stored.nbytes
 
 
 def _place(stored: SpectralData, order: Order) -> _Place:

@@ -8,6 +8,7 @@ radiance of a perfect white diffuser in the scene [W/(sr m2 nm)].
 import struct
 import zipfile
 import zlib
+from collections.abc import Callable
 from pathlib import Path
 from typing import IO, Literal
 
@@ -30,6 +31,10 @@ def open_npz(path: Path) -> SpectralData:
     """Return the header of an npz file. Raise UnusableFile."""
     try:
         with zipfile.ZipFile(path) as archive:
+            stored = {
+                info.filename.removesuffix(".npy"): info.compress_type == zipfile.ZIP_STORED
+                for info in _arrays(archive)
+            }
             shapes = {
                 info.filename.removesuffix(".npy"): _header(archive, info)
                 for info in _arrays(archive)
@@ -54,6 +59,7 @@ def open_npz(path: Path) -> SpectralData:
     return SpectralData(
         (shape[0], shape[1]), wavelengths, quantity, lambda: _read(path, quantity), gain,
         white=white, notes=notes,
+        read_rows=_stored_rows(path, quantity) if stored[quantity] else None,
     )  # fmt: skip
 
 
@@ -112,20 +118,30 @@ def _list(archive: zipfile.ZipFile, shapes: dict[str, tuple[int, ...]], name: st
 
 
 def _read(path: Path, name: str) -> np.ndarray:
-    """Return an array of the archive; without compression, a map of the file."""
+    """Return an array of the archive."""
+    with zipfile.ZipFile(path) as archive, archive.open(f"{name}.npy") as file:
+        return _whole(file)
+
+
+def _stored_rows(path: Path, name: str) -> Callable[[int, int], np.ndarray]:
+    """Return what reads some rows of an array that is not compressed, through a map of the file."""
     with zipfile.ZipFile(path) as archive:
         info = archive.getinfo(f"{name}.npy")
         with archive.open(info) as file:
             shape, by_column, kind = _array_header(file)
             begins = file.tell()
-            if info.compress_type != zipfile.ZIP_STORED:
-                file.seek(0)
-                return _whole(file)
     with path.open("rb") as raw:  # a local header of 30 bytes, two of them lengths that follow
         raw.seek(info.header_offset)
         local = raw.read(30)
     begins += info.header_offset + 30 + sum(struct.unpack("<HH", local[26:30]))
-    return np.memmap(path, kind, "r", begins, shape, "F" if by_column else "C")
+
+    def read(start: int, stop: int) -> np.ndarray:
+        # A map of every call: pages that were read count to the process as long as one is there.
+        return np.array(
+            np.memmap(path, kind, "r", begins, shape, "F" if by_column else "C")[start:stop]
+        )
+
+    return read
 
 
 def _whole(file: IO[bytes]) -> np.ndarray:

@@ -18,7 +18,7 @@ from typing import Any, Literal
 import numpy as np
 
 from vcam_cli.files.file_checks import UnusableFile
-from vcam_cli.files.images.images import check_size, open_image, read_samples
+from vcam_cli.files.images.images import check_size, is_in_strips, open_image, read_samples
 from vcam_cli.files.images.rows import pending_error
 from vcam_cli.files.spectral.data import PER_NM, SpectralData, check_length, finite_numbers
 
@@ -31,6 +31,7 @@ def open_tiff(path: Path) -> SpectralData:
         spec = source.spec()
         if spec.depth > 1 or spec.deep:
             raise UnusableFile("is a volume, not an image")
+        in_strips = is_in_strips(spec)
         pages = _pages(source, spec)
     bands = spec.nchannels if spec.nchannels > 1 else pages
     check_size(spec, bands)
@@ -43,6 +44,7 @@ def open_tiff(path: Path) -> SpectralData:
     return SpectralData(
         (spec.height, spec.width), wavelengths, quantity, lambda: _read(path, pages), gain * unit,
         notes=notes,
+        read_rows=(lambda start, stop: _read(path, pages, (start, stop))) if in_strips else None,
     )  # fmt: skip
 
 
@@ -61,16 +63,16 @@ def _pages(source: Any, first: Any) -> int:
     return count
 
 
-def _read(path: Path, pages: int) -> np.ndarray:
+def _read(path: Path, pages: int, rows: tuple[int, int] | None = None) -> np.ndarray:
     with open_image(path) as source:
         spec = source.spec()
         if spec.nchannels > 1:
-            return read_samples(source, spec, tuple(range(spec.nchannels)))[0]
-        first = read_samples(source, spec, (0,))[0]
-        out = np.empty((spec.height, spec.width, pages), first.dtype)
+            return read_samples(source, spec, tuple(range(spec.nchannels)), rows=rows)[0]
+        first = read_samples(source, spec, (0,), rows=rows)[0]
+        out = np.empty((len(first), spec.width, pages), first.dtype)
         out[:, :, 0] = first[:, :, 0]
         for page in range(1, pages):
-            out[:, :, page] = read_samples(source, spec, (0,), page)[0][:, :, 0]
+            out[:, :, page] = read_samples(source, spec, (0,), page, rows)[0][:, :, 0]
         return out
 
 
