@@ -6,8 +6,14 @@ looked at (October 2026, the same ratios on two busy processors).
 
 from __future__ import annotations
 
+import json
+import socket
+import subprocess
+import sys
 import tempfile
+import time
 from collections.abc import Callable, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +23,8 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.datasets import dataset_file
 from vcam_cli.datasets.dataset import dataset
 from vcam_cli.files.images.png import write_png
+from vcam_cli.files.spectral.exr import write_spectral
+from vcam_cli.progress import Silent
 from vcam_cli.simulation.shared import RECENT, Shared
 from vcam_cli.sweeps.execution import Execution
 
@@ -32,6 +40,7 @@ LEAVES = (
 )
 SMALL = ("array.rows=32", "array.columns=32", "output.render=none")
 IMPORTS = "numpy", "pydantic", "typer"
+BANDS = np.linspace(400e-9, 700e-9, 31)
 COMMANDS = {
     "vcam list": (("list",), 3.4),
     "vcam explain optics.f_number": (("explain", "optics.f_number"), 6.4),
@@ -53,6 +62,10 @@ def repeated(
         f"loops of {count}, over as many frames alone": _loops(repeats, count),
         f"a sweep of {points} frames of 32 x 32 pixels, over a loop": _small_sweep(repeats, points),
         f"commands over the imports of {', '.join(IMPORTS)}": _commands(repeats),
+        "forecast of memory over the peak of `vcam run`": _forecasts(),
+        "memory of a Dask scheduler, at the end over after a tenth of the points": {
+            f"a sweep of {10 * points} points": {"ratio": scheduler_growth(10 * points)}
+        },
     }
 
 
@@ -147,6 +160,83 @@ def _small_frames(repeats: int, size: int, frames: int) -> Row:
 
         one, other = take_turns(repeats, made, lambda: run_cost(noise))
     return one.ratio(other)
+
+
+def _forecasts() -> dict[str, Row]:
+    random = np.random.default_rng(2)
+    with tempfile.TemporaryDirectory() as name:
+        folder, rows, columns = Path(name), 2000, 3000
+        write_png(folder / "photo.png", random.integers(0, 256, (rows, columns, 3), np.uint8))
+        cube = random.random((800, 1000, 31), np.float32)
+        planes = np.moveaxis(cube, 2, 0)
+        write_spectral(folder / "cube.exr", BANDS, planes, cube.shape[:2], "W.m^-2.sr^-1")
+        sources = {
+            "a photograph of 6 megapixels": f"{{kind: image, file: {folder}/photo.png}}",
+            "a cube of 31 bands, EXR": f"{{kind: hyperspectral, file: {folder}/cube.exr}}",
+        }
+        size = f"array.rows={rows}", f"array.columns={columns}", "quality=[]"
+        found = {}
+        for what, source in sources.items():
+            own = ("scene={distance: 1 m}", "scene.wavelengths={start: 400 nm, stop: 700 nm}")
+            sets = (*size, *(own if "cube" in what else ()), f"scene.source={source}")
+            found[what] = {"ratio": forecast_ratio(sets, folder / "out")}
+    return found
+
+
+def forecast_ratio(sets: Sequence[str], out: Path) -> float:
+    """Forecast of memory over the peak of a process that runs the starter camera."""
+    options = [word for each in sets for word in ("--set", each)]
+    command = [sys.executable, "-m", "vcam_cli.commands.main", "run", "starter", "-o", str(out)]
+    subprocess.run([*command, "-q", *options], check=True, stdout=subprocess.DEVNULL)
+    record = json.loads((out / "run.json").read_text())
+    return record["plan"]["memory_bytes"] / record["peak_memory_bytes"]
+
+
+def scheduler_growth(points: int) -> float:
+    """Memory of a Dask scheduler at the end of a sweep over that after a tenth of its points.
+
+    1 without Dask, and where processes do not show their memory.
+    """
+    if find_spec("distributed") is None or not Path("/proc/self/statm").exists():
+        return 1.0
+    module = [sys.executable, "-m", "distributed.cli.dask_"]
+    with tempfile.TemporaryDirectory() as name, socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+        free.close()
+        folder, address = Path(name), f"tcp://127.0.0.1:{port}"
+        here = ("--no-dashboard", "--host", "127.0.0.1")
+        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": name}
+        start = [*module[:2], f"{module[2]}scheduler", *here, "--port", str(port)]
+        scheduler = subprocess.Popen(start, **quiet)
+        start = [*module[:2], f"{module[2]}worker", address, "--no-nanny", "--nthreads", "1"]
+        worker = subprocess.Popen([*start, "--no-dashboard"], **quiet)
+        held: list[int] = []
+
+        class Watch(Silent):
+            def step(self, done: float, total: float) -> None:
+                if not held and done * 10 >= total:
+                    held.append(_resident(scheduler.pid))
+
+        study = folder / "study.yaml"
+        values = f"{{start: 1 e, stop: 2 e, count: {points}}}"
+        study.write_text(
+            "kind: sweep\nname: small\ncamera: starter\nmetrics: [snr_db]\n"
+            f"vary:\n  pixel.readout.read_noise: {values}\n"
+        )
+        try:
+            time.sleep(5)  # the scheduler starts
+            sweep(study, folder / "out", SMALL[:2], scheduler=address, watch=Watch())
+            return _resident(scheduler.pid) / held[0]
+        finally:
+            for process in (worker, scheduler):
+                process.kill()
+                process.wait()
+
+
+def _resident(process: int) -> int:
+    """Resident memory of a process [pages]."""
+    return int(Path(f"/proc/{process}/statm").read_text().split()[1])
 
 
 def _commands(repeats: int) -> dict[str, Row]:

@@ -5,7 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-FORMATS = {"wall": "9.3f", "cpu": "9.3f", "before": "9.3f", "share": "9.2%", "gigabytes": "9.2f"}
+FORMATS = {
+    "wall": "9.3f",
+    "cpu": "9.3f",
+    "before": "9.3f",
+    "ratio": "9.3f",
+    "share": "9.2%",
+    "gigabytes": "9.2f",
+}
 """The columns that a row may have, and how their figures are written."""
 WIDTH = 46
 """Characters before the first column."""

@@ -43,6 +43,8 @@ def found():
         patch.setattr(sections, "_swept", lambda study, out, points: 1.0)
         patch.setattr(sections, "start_cost", lambda work, folder: Cost(len(work), len(work)))
         patch.setattr(repeated, "start_cost", lambda work, folder: Cost(len(work), len(work)))
+        patch.setattr(repeated, "forecast_ratio", lambda sets, out: 1.1)
+        patch.setattr(repeated, "scheduler_growth", lambda points: 1.0)
         patch.setattr(sections, "peak_memory", lambda camera: 1_000_000_000)
         yield measure(TINY)
 
@@ -67,11 +69,11 @@ def test_every_part_is_there(found):
     for word in (
         "frame over R_compute", "shares", "shipped", "photograph", "eight layers",
         "plain NumPy", "wavelengths", "without", "sweep", "growth", "schedules", "command",
-        "data set",
+        "data set", "forecast", "Dask",
     ):  # fmt: skip
         assert word in titles
-    # Frames have their shares besides, layers another denominator, and what is repeated four.
-    assert len(PARTS) == len(found["sections"]) - 5
+    # Frames have their shares besides, layers another denominator, and what is repeated six.
+    assert len(PARTS) == len(found["sections"]) - 7
     assert set(found["sections"]["frame over the same without"]) == set(TINY.effects)
     (camera,) = found["sections"]["frame time over R_compute, shipped cameras"]
     assert camera.startswith("csf-monochrome, ")

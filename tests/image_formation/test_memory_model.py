@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.io
 from optical_paths import Leaning, aperture, of_picture, on_chart, path, sensor
 from reference_cameras import write_picture
 
@@ -16,6 +17,8 @@ from vcam_cli import load, memory
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.errors import CannotDo
+from vcam_cli.files.images.exr import write_exr
+from vcam_cli.files.images.png import write_png
 from vcam_cli.image_formation import strategies
 from vcam_cli.image_formation.estimates import memory_model
 from vcam_cli.image_formation.settings import STANDARD
@@ -136,6 +139,52 @@ def test_pictures_take_no_more_than_estimated(name, tmp_path):
     source = f"scene.source={{kind: image, file: {file}, encoding: linear, model: mallett}}"
     estimated, peak = measured("colorchecker-d65", [*LARGE, source, "quality=[]"])
     assert peak <= estimated <= 2.5 * peak, (estimated, peak)
+
+
+def run_memory(name: str, sets: list[str], out: Path) -> tuple[int, int]:
+    """The forecast and the peak of `vcam run` [bytes]."""
+    options = [word for each in sets for word in ("--set", each)]
+    command = [sys.executable, "-m", "vcam_cli.commands.main", "run", name, "-o", str(out), "-q"]
+    subprocess.run([*command, "--workers", "1", *options], check=True, capture_output=True)
+    record = json.loads((out / "run.json").read_text())
+    return record["plan"]["memory_bytes"], record["peak_memory_bytes"]
+
+
+@pytest.mark.long
+@pytest.mark.skipif(sys.platform == "win32", reason="peaks of processes are read as on POSIX")
+@pytest.mark.parametrize("source", ["chart", "photograph", "depth", "exr", "npz", "mat"])
+def test_the_forecast_of_a_run_is_within_a_fifth_of_its_peak(source, tmp_path):
+    """Of processes that take more than the libraries, 300 MB."""
+    random, band = np.random.default_rng(1), "scene.wavelengths={start: 400 nm, stop: 700 nm}"
+    shape, file = (2000, 3000), tmp_path / f"cube.{source}"
+    name, given = "colorchecker-d65", [] if source == "chart" else [band]
+    if source in ("photograph", "depth"):
+        name, file = "starter", tmp_path / "photo.png"
+        write_png(file, random.integers(0, 256, (*shape, 3), np.uint8))
+        more = ""
+        if source == "depth":
+            far = (1 + 2 * random.random((25, 38))).repeat(80, 0).repeat(80, 1)[:2000, :3000]
+            write_exr(tmp_path / "depth.exr", {"Z": far.astype(np.float32)})
+            more = f", depth: {tmp_path}/depth.exr"
+        given = [f"scene.source={{kind: image, file: {file}{more}}}"]
+    elif source != "chart":
+        cube, nm = random.random((1000, 1300, 31), np.float32), np.linspace(400, 700, 31)
+        given.append(f"scene.source={{kind: hyperspectral, file: {file}}}")
+        if source == "npz":
+            np.savez_compressed(file, wavelength_nm=nm, reflectance=cube)
+        elif source == "exr":
+            names = [f"T.{wavelength:g}nm" for wavelength in nm]
+            write_exr(file, dict(zip(names, np.moveaxis(cube, 2, 0), strict=True)))
+        else:
+            named = {"reflectance": cube.astype(float), "wave": nm}
+            scipy.io.savemat(file, named)
+            given[-1] = (
+                given[-1][:-1] + ", variables: {reflectance: reflectance, wavelength: wave}}"
+            )
+    size = [f"array.rows={shape[0]}", f"array.columns={shape[1]}", "quality=[]"]
+    forecast, peak = run_memory(name, [*size, *given], tmp_path / "out")
+    assert peak > 300e6
+    assert peak <= forecast <= 1.2 * peak, (forecast, peak)
 
 
 @pytest.mark.parametrize("lens", [[], [COMA], [OVER_THE_FIELD]], ids=["plain", "coma", "field"])

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from itertools import chain
 
 import numpy as np
@@ -225,17 +226,16 @@ def _spectral_layers(
     painted = scene if chosen and isinstance(scene, ChartScene) else None
     size = table_size(path, highest)
     mixing = field_mixtures(exact, field_rings, size) if field_rings else mixtures(exact, size)
-    needed = memory_model.image_bytes(path, scene, highest, len(mixing[0]), rings)
-    memory.require(needed, g.rows, g.columns)
     if path.device.whole:
         on_device = memory_model.device_bytes(path, scene, highest, len(mixing[0]))
         require(path.device, on_device, f"{g.rows} x {g.columns} pixels")
     least = max((part.nyquist(g) for part in rings), default=LOWEST)
+    needed = partial(memory_model.image_bytes, path, scene, highest, len(mixing[0]), rings)
+    memory.require(needed(least), g.rows, g.columns)
     image = sampled_image(path, scene, highest, mixing, least)
     size = table_size(path, image.highest)
-    if of_tables := memory_model.table_bytes(path, len(mixing[0]), size):
-        needed += of_tables
-        memory.require(needed, g.rows, g.columns)
+    total = needed(image.highest) + memory_model.table_bytes(path, len(mixing[0]), size)
+    memory.require(total, g.rows, g.columns)
     modes: tuple[Mode, ...] = ()
     if field_rings:
         tables, modes = tabulate_field(exact, field_rings, g, size, mixing)
@@ -269,7 +269,7 @@ def _spectral_layers(
         filters=len(tables.parities) * (1 + len(modes)),
         table_values=sum(plane.size for plane in planes),
         peak=image.peak,
-        memory=needed,
+        memory=total,
         device=path.device.label,
     )
     here = image_filter.on(path.device)

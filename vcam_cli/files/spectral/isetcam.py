@@ -66,8 +66,14 @@ def open_isetcam(path: Path) -> SpectralData:
     white = _white(get, wavelengths, per_photon)
     height, width = photons.shape[:2]
     return SpectralData(
-        (height, width), wavelengths, "radiance", lambda: photons, per_photon, white=white
-    )
+        (height, width), wavelengths, "radiance", lambda: photons, per_photon, white=white,
+        copies=_copies(photons),
+    )  # fmt: skip
+
+
+def _copies(values: np.ndarray) -> int:
+    """Return what the map of a file of 64-bit numbers takes beside them, in copies as float32."""
+    return 1 if values.dtype.itemsize == 8 else 0
 
 
 def open_variables(path: Path, names: Variables) -> SpectralData:
@@ -92,7 +98,7 @@ def open_variables(path: Path, names: Variables) -> SpectralData:
     notes = (f"{name} is read as radiance in W/(sr m2 nm)",) if names.radiance else ()
     return SpectralData(
         (values.shape[0], values.shape[1]), wavelengths * unit, quantity, lambda: values,
-        GAINS[quantity], notes=notes,
+        GAINS[quantity], notes=notes, copies=_copies(values),
     )  # fmt: skip
 
 
