@@ -54,7 +54,7 @@ def test_the_table_has_what_changes_the_mean_signal_before_shot_noise():
 
 
 def test_the_file_can_switch_every_effect_and_no_other():
-    assert set(EFFECTS) == {kind.name for kind in ORDER}
+    assert list(EFFECTS) == [kind.name for kind in ORDER]
 
 
 def test_keys_behind_the_light_are_keys_of_the_file():

@@ -13,7 +13,7 @@ from making import QUIET, camera, long_except
 
 from vcam_cli import simulate
 from vcam_cli.camera.derived.geometry import geometry
-from vcam_cli.camera.derived.prescription import sensor_view, traced_lens
+from vcam_cli.camera.derived.traced import traced_view
 from vcam_cli.lenses.wavefronts import trace_field
 
 ROWS, COLUMNS, PITCH, SIDE = 72, 96, 20e-6, 20e-6 * math.sqrt(0.5)
@@ -60,7 +60,7 @@ def picture(folder) -> dict:
 def seen(model, x: float, y: float) -> float:
     """What a pixel sees over what it sees of the mean."""
     solved = geometry(model)
-    view = sensor_view(traced_lens(model), solved.object_distance, 0.0)
+    view = traced_view(model, solved.object_distance)
     height = math.hypot(x, y)
     front = trace_field(view, np.array([height]), WAVELENGTH, WAVELENGTH)
     outwards = complex(x, y) / height

@@ -8,7 +8,7 @@ from making import camera as camera_of
 
 from vcam_cli import load, simulate
 from vcam_cli.camera.derived.geometry import geometry
-from vcam_cli.camera.derived.prescription import sensor_view, traced_lens
+from vcam_cli.camera.derived.traced import traced_lens, traced_view
 from vcam_cli.effects.optics.aberration import Aberration
 from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.effects.optics.distortion import Distortion
@@ -65,7 +65,7 @@ def test_the_files_image_plane_is_where_the_file_has_it():
         "scene.distance=infinity",
         "optics.prescription={use: double-gauss, scale: 1, image_plane: file}",
     )
-    view = sensor_view(traced_lens(model), math.inf, 0.0)
+    view = traced_view(model, math.inf)
     assert view.lens.surfaces[-1].thickness == pytest.approx(42.35170011441e-3, rel=1e-12)
     near = traced_lens(
         camera("optics.prescription={use: double-gauss, scale: 1, image_plane: file}")

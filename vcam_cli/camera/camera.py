@@ -5,7 +5,6 @@ from functools import cache
 from typing import Any
 
 from vcam_cli import errors
-from vcam_cli.camera import hints
 from vcam_cli.camera.derived import (
     electrical,
     falloff,
@@ -23,7 +22,7 @@ from vcam_cli.config.file_format import FileFormat
 from vcam_cli.config.file_names import current_folder
 from vcam_cli.config.merge import Alternatives, MergeRules
 from vcam_cli.config.yaml_tree import Key, Node
-from vcam_cli.errors import BadInput
+from vcam_cli.errors import BadInput, Problem
 from vcam_cli.floats import own_float_errors
 
 EXAMPLE = "starter"
@@ -112,6 +111,13 @@ def _refuse_study(root: Node) -> None:
         raise BadInput([kind.problem(("kind",), message, remedy)])
 
 
+def _advise(problem: Problem, given: object) -> Problem:
+    """Return a problem with the remedy of someone who knows cameras, where there is one."""
+    from vcam_cli.camera import hints  # of files with mistakes only
+
+    return hints.advise(problem, given)
+
+
 FORMAT = FileFormat(
     model=Camera,
     kind="cameras",
@@ -121,7 +127,7 @@ FORMAT = FileFormat(
     file_keys=FILE_KEYS,
     merge_rules=MERGE_RULES,
     refuse=_refuse_study,
-    advise=hints.advise,
+    advise=_advise,
     checks=(
         (named_spectra.check_spectra, "scene"),
         (geometry.check, "scene optics pixel array"),

@@ -1,6 +1,7 @@
 """What stands before the sensor: a lens, or nothing."""
 
 from collections.abc import Mapping
+from functools import cache
 from typing import Any, Literal
 
 from vcam_cli.camera.optics import Optics
@@ -20,12 +21,14 @@ class NoLens(Optics):
         return False
 
 
-NO_LENS = NoLens.model_validate({"transmittance": 1, "off_axis": "none", "diffraction": False})
+@cache
+def _no_lens() -> NoLens:
+    return NoLens.model_validate({"transmittance": 1, "off_axis": "none", "diffraction": False})
 
 
 def _optics(given: Any) -> Optics:
     if given == "none":
-        return NO_LENS
+        return _no_lens()
     if isinstance(given, (Mapping, Optics)):
         return Optics.model_validate(given)
     remedy = "write {f_number: 2.8, focal_length: 3.2 mm}, the name of a part, or none"

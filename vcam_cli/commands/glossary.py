@@ -11,6 +11,8 @@ from pathlib import Path
 
 import yaml
 
+from vcam_cli.config.yaml_reader import LOADER
+
 
 @dataclass(frozen=True)
 class Term:
@@ -32,7 +34,7 @@ def terms() -> dict[str, Term]:
     text = (Path(__file__).parent / "terms.yaml").read_text("utf-8")
     return {
         name: Term(name, **{**entry, "also": tuple(entry.get("also", ()))})
-        for name, entry in yaml.safe_load(text).items()
+        for name, entry in yaml.load(text, Loader=LOADER).items()
     }
 
 

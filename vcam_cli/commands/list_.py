@@ -66,6 +66,9 @@ def list_(
         near = WORDS.get(kind.lower()) or nearest(kind, KINDS)
         remedy = f"did you mean {near}?" if near else f"kinds: {', '.join(KINDS)}"
         raise bad((), f"{kind!r} is not a kind of thing that ships", remedy)
+    if kind is None and not as_json:
+        _print_table("kind", [(k, ", ".join(_names(k)) or "(none yet)") for k in KINDS], ":")
+        return
     found = {k: list(KINDS[k]()) for k in ([kind] if kind else KINDS)}
     if kind is not None and name is not None:
         chosen = _choose(kind, name, found[kind])
@@ -79,9 +82,15 @@ def list_(
         options.write_json({k: [_plain(item) for item in items] for k, items in found.items()})
     elif kind is not None:
         _print_table(kind, [(item.name, item.about) for item in found[kind]])
-    else:
-        listed = {k: ", ".join(item.name for item in items) for k, items in found.items()}
-        _print_table("kind", [(k, names or "(none yet)") for k, names in listed.items()], ":")
+
+
+def _names(kind: str) -> list[str]:
+    """Return the names of a kind; those of effects without their classes, to start sooner."""
+    if kind == "effects":
+        from vcam_cli.camera.simulation import EFFECTS
+
+        return list(EFFECTS)
+    return [item.name for item in KINDS[kind]()]
 
 
 def _choose(kind: str, name: str, items: list[Item]) -> Item:

@@ -14,9 +14,9 @@ import sys
 
 from vcam_cli import interrupts
 
-# For a quick start. Imports make 120,000 objects that stay: collecting garbage among them again and
-# again takes a tenth of the time, and so does looking for plug-ins of pydantic in every package.
-gc.set_threshold(50_000, 10, 10)
+# For a quick start. Imports make 120,000 objects that stay: collecting garbage among them takes a
+# tenth of the time, and so does looking for plug-ins of pydantic in every package.
+gc.set_threshold(200_000, 10, 10)
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 try:
@@ -184,6 +184,11 @@ def main() -> None:
             # Python itself would report the signal where it was running text (`exec`) meanwhile.
             os._exit(interrupts.INTERRUPTED)
         raise
+    finally:
+        # Python looks for garbage once more at its end, which takes a tenth of a command that forms
+        # no frame. OpenImageIO needs it: without, it reports what it still holds.
+        if "OpenImageIO" not in sys.modules:
+            gc.freeze()
 
 
 def _main() -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, get_args
 
 from pydantic import BaseModel
@@ -24,8 +24,6 @@ class Key:
     """Unit that is written, "" for none."""
     example: str
     """A value, as YAML has it."""
-    default: Any
-    """Value where it is not given, as YAML has it; None without a default."""
     required: bool
     """Whether it must be given."""
     model: type[BaseModel]
@@ -36,6 +34,12 @@ class Key:
         """The last part of its path."""
         return str(self.path[-1])
 
+    @property
+    def default(self) -> Any:
+        """Value where it is not given, as YAML has it; None without a default."""
+        field = key_fields(self.model)[self.name]
+        return _defaults(self.model).get(field.alias or self.name)
+
     @cached_property  # `explain` compares a word with those of all keys
     def dotted(self) -> str:
         """Its path as `--set` writes it."""
@@ -44,7 +48,6 @@ class Key:
 
 def keys(model: type[BaseModel], above: Path = ()) -> Iterator[Key]:
     """Yield all keys of a model and below; those that share a path come one after another."""
-    defaults = model.model_construct().model_dump(mode="json")
     for name, field in key_fields(model).items():
         path, extra = (*above, name), field.json_schema_extra or {}
         yield Key(
@@ -52,13 +55,21 @@ def keys(model: type[BaseModel], above: Path = ()) -> Iterator[Key]:
             field.description or "",
             str(extra.get("unit", "")) if isinstance(extra, dict) else "",
             yaml_text(field.examples[0]) if field.examples else "",
-            defaults.get(str(field.alias or name)),
             field.is_required(),
             model,
         )
         for below in dict.fromkeys(_models((field.annotation, *field.metadata))):
             if below.__doc__ and path.count(name) == 1:
                 yield from keys(below, path)
+
+
+@cache
+def _defaults(model: type[BaseModel]) -> dict[str, Any]:
+    """Return the defaults of a model's keys, as YAML has them.
+
+    Only of the keys that are explained: pydantic takes 1 ms to write those of a model.
+    """
+    return model.model_construct().model_dump(mode="json")
 
 
 def _models(forms: Any) -> Iterator[type[BaseModel]]:

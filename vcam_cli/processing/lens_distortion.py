@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy import ndimage
 
 from vcam_cli.arrays import Array
 from vcam_cli.processing.base import Block, Correction, mirrored_index
@@ -28,12 +27,14 @@ class Undistort:
 
     def process_block(self, block: Block) -> Block:
         """Return the block after the step, less its halo."""
+        from scipy.ndimage import map_coordinates
+
         halo, first, count = self.halo, block.first_row, block.planes.shape[1]
         inside = mirrored_index(np.arange(first, first + count), self.rows) - first
         planes = block.planes[:, inside]  # steps before know nothing of what is beyond the border
         rows, columns = self.correction.sources(first + halo, first + count - halo)
         at = np.array([rows - first, columns])
-        done = [ndimage.map_coordinates(plane, at, order=ORDER, mode="mirror") for plane in planes]
+        done = [map_coordinates(plane, at, order=ORDER, mode="mirror") for plane in planes]
         return Block(np.array(done, dtype=np.float32), first + halo)
 
     def process_colors(self, values: Array) -> Array:

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import ndimage
 
 from vcam_cli.arrays import Array
 from vcam_cli.parallel import pieces, product
@@ -256,6 +255,8 @@ class WarpedChart(Chart):
         return out
 
     def _values(self, at: tuple[Array, Array], mix: Array) -> Array:
+        from scipy.ndimage import map_coordinates
+
         axes = []
         for axis, place in enumerate(at):
             along = np.abs(np.diff(place, axis=1 - axis)) if place.shape[1 - axis] > 1 else place
@@ -265,9 +266,7 @@ class WarpedChart(Chart):
         x, y = axes
         planes = self.chart.values(x, y, mix)
         index = [(at[1] - y[0]) / (y[1] - y[0]), (at[0] - x[0]) / (x[1] - x[0])]
-        return np.array(
-            [ndimage.map_coordinates(p, index, order=1, mode="nearest") for p in planes]
-        )
+        return np.array([map_coordinates(p, index, order=1, mode="nearest") for p in planes])
 
 
 @dataclass(frozen=True)

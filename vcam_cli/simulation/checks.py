@@ -26,7 +26,6 @@ from vcam_cli.effects import readout_chain
 from vcam_cli.effects.noise import fpn_maps
 from vcam_cli.effects.optics import aberration, point_spread
 from vcam_cli.errors import bad, split
-from vcam_cli.solve.effects import camera_effects
 from vcam_cli.solve.layout import camera_layout
 
 SOURCE = ("scene", "source")
@@ -73,6 +72,8 @@ def check_effects(camera: Camera) -> None:
     """
     if not isinstance(camera.effects, dict) or "on" not in camera.effects.values():
         return
+    from vcam_cli.solve.effects import camera_effects
+
     good = example()
     names = ("conversion_gain", "voltage_swing", "full_well")
     solved = {name: getattr(good.pixel.readout, name) for name in names}

@@ -61,11 +61,6 @@ class LensPage:
     """Paraxial focus at `wavelengths` behind that at the primary one (W,)."""
 
 
-def is_traced(solved: Solved) -> bool:
-    """Return whether a camera's lens is given by its surfaces."""
-    return bool(_traced(solved))
-
-
 def _traced(solved: Solved) -> tuple[TracedBlur, ...]:
     return of_kind((e for e in solved.effects.found.values() if e is not None), TracedBlur)
 

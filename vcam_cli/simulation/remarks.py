@@ -13,7 +13,6 @@ from vcam_cli.camera.processing import SHOWN
 from vcam_cli.camera.scene.scene_files import ImageFile
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES
 from vcam_cli.effects.base import of_kind
-from vcam_cli.effects.optics.traced_blur import TracedBlur
 from vcam_cli.effects.pixel_signal import ColumnSpread, Overflow
 from vcam_cli.effects.signal_chain import SIGMAS
 from vcam_cli.effects.warps import ImageMotion
@@ -132,6 +131,10 @@ def _picture(ready: Prepared) -> AnyScene:
 
 def _prescription(ready: Prepared) -> tuple[str, ...]:
     """Return which data of a traced lens the simulation ignores, and how many rays fail."""
+    if ready.solved.optics.prescription is None:
+        return ()
+    from vcam_cli.effects.optics.traced_blur import TracedBlur
+
     found = (effect for effect in ready.solved.effects.found.values() if effect is not None)
     notes: list[str] = []
     for blur in of_kind(found, TracedBlur):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vcam_cli.camera.derived.geometry import Geometry, geometry
-from vcam_cli.camera.derived.prescription import illumination, sensor_view, traced_lens
+from vcam_cli.camera.derived.traced import traced_view
 from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.optics import FalloffFile
 from vcam_cli.errors import Path, bad, data_file_problems
@@ -40,8 +40,9 @@ def falloff(camera: CameraModel, geometry: Geometry) -> Falloff | None:
     given = camera.optics.off_axis
     if isinstance(given, FalloffFile):
         return _read(given, geometry, PATH)
-    if given == "exact" and (lens := traced_lens(camera)):
-        view = sensor_view(lens, geometry.object_distance, camera.optics.defocus)
+    if given == "exact" and (view := traced_view(camera, geometry.object_distance)):
+        from vcam_cli.camera.derived.prescription import illumination
+
         corner = float(np.hypot(geometry.sensor_width, geometry.sensor_height)) / 2
         traced = illumination(view, corner)
         return Falloff(traced.heights, traced.values, is_traced=True)

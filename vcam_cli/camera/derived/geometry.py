@@ -22,7 +22,7 @@ from vcam_cli.camera.derived.pixel_layout import (
     detector_area,
     sampling_scale,
 )
-from vcam_cli.camera.derived.prescription import axial_area, sensor_view, traced_lens
+from vcam_cli.camera.derived.traced import traced_view
 from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.scene.scene import Extent
 from vcam_cli.errors import Collector, bad
@@ -316,10 +316,12 @@ def _areas(camera: CameraModel) -> tuple[Area, Area]:
 
 
 def _traced_area(camera: CameraModel) -> float | None:
-    traced = traced_lens(camera)
-    if traced is None:
+    view = traced_view(camera, scene_distance(camera))
+    if view is None:
         return None
-    return axial_area(sensor_view(traced, scene_distance(camera), camera.optics.defocus))
+    from vcam_cli.camera.derived.prescription import axial_area
+
+    return axial_area(view)
 
 
 def _scene_width(camera: CameraModel, scale: float) -> float | None:

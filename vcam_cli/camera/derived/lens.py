@@ -10,7 +10,7 @@ import numpy as np
 
 from vcam_cli.camera.derived.lattice import lattice
 from vcam_cli.camera.derived.lens_models import distortion_table, half_extent
-from vcam_cli.camera.derived.prescription import traced_lens
+from vcam_cli.camera.derived.traced import traced_lens
 from vcam_cli.camera.lens_distortion import DistortionFile
 from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.optics import LEAST_F_NUMBER, MOST_F_NUMBER, Optics

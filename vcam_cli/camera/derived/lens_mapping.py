@@ -9,8 +9,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry, geometry
 from vcam_cli.camera.derived.lens_models import PATH, distortion_table, stated_mappings
-from vcam_cli.camera.derived.prescription import distortion as traced_distortion
-from vcam_cli.camera.derived.prescription import sensor_view, traced_lens
+from vcam_cli.camera.derived.traced import traced_view
 from vcam_cli.camera.lens_distortion import DistortionFile, OpenCvDistortion
 from vcam_cli.camera.model import CameraModel
 from vcam_cli.errors import bad
@@ -38,8 +37,9 @@ def lens_mapping(camera: CameraModel, geometry: Geometry) -> Mapping | None:
         table = distortion_table(optics.distortion.file)
         scaled = tuple(height / geometry.image_distance for height in table.heights)
         found.append(DistortionTable(scaled, table.distortions))
-    if traced := traced_lens(camera):
-        view = sensor_view(traced, geometry.object_distance, optics.defocus)
+    if view := traced_view(camera, geometry.object_distance):
+        from vcam_cli.camera.derived.prescription import distortion as traced_distortion
+
         corner = math.hypot(geometry.sensor_width, geometry.sensor_height) / 2
         own = traced_distortion(view, corner)
         scaled = tuple(height / geometry.image_distance for height in own.heights)

@@ -107,14 +107,11 @@ def _to_flattest(view: View) -> float:
     return float((share * change) @ path / ((share * change) @ change))
 
 
-def traced_lens(camera: CameraModel) -> TracedLens | None:
-    """Return the lens of a camera with a prescription, else None.
+def read_lens(camera: CameraModel, given: Given) -> TracedLens:
+    """Return the lens of a camera with a prescription.
 
     Raises BadInput for a lens that cannot be had, CannotDo where its file may not be read.
     """
-    given = camera.optics.prescription
-    if given is None:
-        return None
     lens = _read(given)
     _require_wavelengths(lens, camera.scene.wavelengths.start, camera.scene.wavelengths.stop)
     focus = camera.optics.focus_distance

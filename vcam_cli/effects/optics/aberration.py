@@ -18,13 +18,14 @@ camera file determines the class:
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.optics.field_blur import FieldBlur
 from vcam_cli.effects.optics.measured_mtf import FieldMtf, MeasuredMtf
 from vcam_cli.effects.optics.point_spread import PointSpread
 from vcam_cli.effects.optics.shaped_blur import ShapedBlur
-from vcam_cli.effects.optics.traced_blur import TracedBlur
 from vcam_cli.effects.optics.wavefront_blur import (
     AberrationBlur,
     DirectedBlur,
@@ -36,11 +37,23 @@ from vcam_cli.effects.optics.wavefront_blur import (
 from vcam_cli.errors import bad
 from vcam_cli.physics import aberration, zernike
 
-KINDS = (
-    *(TracedBlur, ShapedBlur, PointSpread, MeasuredMtf, FieldMtf),
-    *(SymmetricBlur, DirectedBlur, FieldBlur),
-)
-"""Kinds of blur; a camera has at most one of them."""
+if TYPE_CHECKING:
+    from vcam_cli.effects.optics.traced_blur import TracedBlur
+
+KINDS = (ShapedBlur, PointSpread, MeasuredMtf, FieldMtf, SymmetricBlur, DirectedBlur, FieldBlur)
+"""Kinds of blur of a lens that is not traced; a camera has at most one of them."""
+
+
+def _traced(camera: Camera, geometry: Geometry) -> TracedBlur | None:
+    """Return the blur of a lens given by its prescription, else None.
+
+    The tracer is imported only then, as in `camera/derived/traced.py`.
+    """
+    if camera.optics.prescription is None:
+        return None
+    from vcam_cli.effects.optics.traced_blur import TracedBlur
+
+    return TracedBlur.from_camera(camera, geometry)
 
 
 class Aberration(AberrationBlur):
@@ -49,6 +62,8 @@ class Aberration(AberrationBlur):
     @classmethod
     def from_camera(cls, camera: Camera, geometry: Geometry) -> AberrationBlur | None:
         """Return the kind of blur that the camera's lens has, or None for a perfect lens."""
+        if traced := _traced(camera, geometry):
+            return traced
         blurs = (kind.from_camera(camera, geometry) for kind in KINDS)
         return next((blur for blur in blurs if blur is not None), None)
 
@@ -76,7 +91,7 @@ def check(camera: Camera, geometry: Geometry) -> None:
             "a measured blur holds for the distance in focus, and is unknown at others",
             "write psf: none and mtf: none, or put the scene in focus",
         )
-    if traced := TracedBlur.from_camera(camera, geometry):
+    if traced := _traced(camera, geometry):
         try:
             traced.check()
         except ValueError as error:

@@ -16,8 +16,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.color_errors import WavelengthTable
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.camera.derived.prescription import lateral_color as traced_lateral_color
-from vcam_cli.camera.derived.prescription import sensor_view, traced_lens
+from vcam_cli.camera.derived.traced import traced_view
 from vcam_cli.effects.warps import Magnification
 
 
@@ -40,8 +39,9 @@ class LateralColor(Magnification):
         """Return the lateral color of a camera's lens, or None where it has none."""
         table = camera.optics.lateral_color
         corner = float(np.hypot(geometry.sensor_width, geometry.sensor_height)) / 2
-        if traced := traced_lens(camera):
-            view = sensor_view(traced, geometry.object_distance, camera.optics.defocus)
+        if view := traced_view(camera, geometry.object_distance):
+            from vcam_cli.camera.derived.prescription import lateral_color as traced_lateral_color
+
             band = camera.scene.wavelengths
             table = traced_lateral_color(view, corner, band.start, band.stop)
         if not camera.optics.is_lens or table is None or not any(v for _, v in table.points):

@@ -19,12 +19,8 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.color_errors import WavelengthTable
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.camera.derived.prescription import (
-    lateral_color,
-    sensor_view,
-    traced_lens,
-    wavefronts,
-)
+from vcam_cli.camera.derived.prescription import lateral_color, wavefronts
+from vcam_cli.camera.derived.traced import traced_view
 from vcam_cli.effects.base import SignalLevels, switched_off
 from vcam_cli.effects.blurs import FieldTransfer, PlaneTransfer, Zone
 from vcam_cli.effects.optics.field_blur import ZoneWeight
@@ -302,10 +298,9 @@ class TracedBlur(AberrationBlur, FieldTransfer):
     @classmethod
     def from_camera(cls, camera: Camera, geometry: Geometry) -> TracedBlur | None:
         """Return the blur of a lens given by its prescription, else None."""
-        traced = traced_lens(camera)
-        if traced is None:
+        view = traced_view(camera, geometry.object_distance)
+        if view is None:
             return None
-        view = sensor_view(traced, geometry.object_distance, camera.optics.defocus)
         half_diagonal = math.hypot(geometry.sensor_width, geometry.sensor_height) / 2
         band = camera.scene.wavelengths
         diffracts = camera.optics.diffraction and not switched_off(camera, "diffraction")

@@ -22,9 +22,7 @@ from vcam_cli.reports import page, pictures
 from vcam_cli.reports.page import Facts, Page, Part, Picture, Section, Table, Text
 from vcam_cli.reports.run_facts import exposure_rows, geometry_rows, metric_rows, spoken
 from vcam_cli.simulation.frame import Frame
-from vcam_cli.simulation.lens_page import is_traced, lens_page
 from vcam_cli.simulation.output import report_plots
-from vcam_cli.simulation.output.lens_plot import plot_lens
 from vcam_cli.simulation.photograph import Photograph, needs_picture
 
 GROUP = "frame"
@@ -140,8 +138,11 @@ def _raw(result: Photograph) -> Iterator[Part]:
 
 def _lens(frame: Frame) -> Iterator[Part]:
     """Yield the page of a lens that is traced."""
-    if not is_traced(frame.solved):
+    if frame.solved.optics.prescription is None:
         return
+    from vcam_cli.simulation.lens_page import lens_page
+    from vcam_cli.simulation.output.lens_plot import plot_lens
+
     found = lens_page(frame.solved)
     drawn = atomic.written_bytes("lens.png", lambda path: plot_lens(path, found))
     title = f"Rays, spots, MTF and colors of {found.title}"
