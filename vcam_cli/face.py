@@ -38,12 +38,19 @@ DPI, DISTANCE = 72.0, "18 in"
 
 
 def plan(
-    camera: Camera | str | Path, workers: int | None = None, watch: Watch = None
+    camera: Camera | str | Path,
+    workers: int | None = None,
+    watch: Watch = None,
+    details: bool = False,
 ) -> PlannedRun:
-    """Return what a run would simulate, what not, why, and at what cost: `vcam plan`."""
+    """Return what a run would simulate, what not, why, and at what cost: `vcam plan`.
+
+    details: form the light of all pixels; without it a plan of a large array estimates exposure and
+    noise from the light of some 65,000 places.
+    """
     from vcam_cli.simulation.planned import planned_run
 
-    return planned_run(_camera(camera), _threads(workers), observer(watch))
+    return planned_run(_camera(camera), _threads(workers), observer(watch), details)
 
 
 def accuracy(

@@ -64,7 +64,9 @@ PlannedDevice = Annotated[
 Details = Annotated[
     bool,
     typer.Option(
-        "--details", help="Print every effect with who decided it and why, and all settings."
+        "--details",
+        help="Print every effect with who decided it and why, and all settings; of a large array,"
+        " compute the light of all pixels.",
     ),
 ]
 
@@ -88,8 +90,9 @@ def plan(
 ) -> None:
     """Show the effects that a run simulates or skips, with reasons, and its time and memory.
 
-    Computes the irradiance on the pixels, since the contribution of an effect depends on the
-    scene. Only --measure takes frames, and only --scenes and --lens write files.
+    Effects on the light are decided by bounds for the whole array. Exposure and noise follow from
+    the light of the pixels; of a large array the light of some 65,000 places is computed, with
+    --details all of it. Only --measure takes frames, and only --scenes and --lens write files.
 
     \b
     Example:
@@ -130,7 +133,7 @@ def plan(
 
     model = load(camera, options.overrides(set_, accuracy=accuracy))
     with Progress(quiet) as progress:
-        found = face.plan(model, workers, progress)
+        found = face.plan(model, workers, progress, details)
     for note in found.notes:
         options.say(note, quiet)
     report, solved = found.report(), found.geometry
@@ -210,12 +213,23 @@ def facts(
     return [
         ("geometry", f"{geometry['rows']} x {geometry['columns']} {place}"),
         ("exposure", f"{exposure_time:.4g} s{several}"),
+        *([("estimate", _estimate(report, geometry))] if report.get("estimated_places") else []),
         *([("crosstalk", mixing(report["color_mixing"]))] if "color_mixing" in report else []),
         *([("readout", frame_rate)] if frame_rate else []),
         ("accuracy", f"rms error within {100 * report['settings']['tolerance']:.3g} % of signal"),
         ("cost", f"about {seconds:.2g} s and {memory:.0f} MB"),
         *([("device", _on_device(report))] if "device" in report else []),
     ]
+
+
+def _estimate(report: dict[str, Any], geometry: dict[str, Any]) -> str:
+    """Return what a plan of a large array leaves open until the run."""
+    places = report["estimated_places"]
+    pixels = geometry["rows"] * geometry["columns"] / places
+    return (
+        f"exposure and noise from {places:,} means over {pixels:.3g} pixels each; a run decides on"
+        " noise, charge and automatic exposure by the light of every pixel, as --details does"
+    )
 
 
 def _on_device(report: dict[str, Any]) -> str:

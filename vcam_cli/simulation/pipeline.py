@@ -33,6 +33,7 @@ from vcam_cli.effects.shading import ArrayShading
 from vcam_cli.processing import Context, Patches, ProcessedPicture, process
 from vcam_cli.simulation import autofocus, cost_model
 from vcam_cli.simulation.bracket import bracket_cameras, bracket_note, longest_of, merged_bracket
+from vcam_cli.simulation.coarse_light import coarse_camera, estimated_light
 from vcam_cli.simulation.exposed_light import expose
 from vcam_cli.simulation.frame import Frame, take_frame
 from vcam_cli.simulation.preparation import Prepared, plan_frame
@@ -44,7 +45,9 @@ from vcam_cli.simulation.shared import Shared
 from vcam_cli.solve.solved import Solved
 
 
-def prepare(camera: Camera, run: Run, shared: Shared) -> tuple[Prepared, tuple[str, ...]]:
+def prepare(
+    camera: Camera, run: Run, shared: Shared, is_estimated: bool = False
+) -> tuple[Prepared, tuple[str, ...]]:
     """Bring the light of a camera's scene to its pixels, time the exposure, plan what will run.
 
     Parameters
@@ -55,6 +58,8 @@ def prepare(camera: Camera, run: Run, shared: Shared) -> tuple[Prepared, tuple[s
         How it is computed.
     shared : Shared
         What cameras before this one had in common with it.
+    is_estimated : bool, optional
+        Whether the light of few places suffices, as for a plan.
 
     Returns
     -------
@@ -78,11 +83,13 @@ def prepare(camera: Camera, run: Run, shared: Shared) -> tuple[Prepared, tuple[s
     solved, picture, flat = flattened(solved, picture)
     trial = partial(_prepare, picture=picture, run=run.unseen())
     solved, focused, seconds = autofocus.focused(solved, trial, run.workers, run.stages)
-    ready = prepare_light(solved, picture, run.after(seconds))
+    ready = prepare_light(solved, picture, run.after(seconds), is_estimated)
     return ready, of_bracket + notes + flat + focused
 
 
-def prepare_light(solved: Solved, picture: ScenePicture, run: Run) -> Prepared:
+def prepare_light(
+    solved: Solved, picture: ScenePicture, run: Run, is_estimated: bool = False
+) -> Prepared:
     """Return a camera in focus, ready to take its frame of the scene.
 
     A camera that times its exposure by a scene that moves meters the scene at rest.
@@ -95,19 +102,22 @@ def prepare_light(solved: Solved, picture: ScenePicture, run: Run) -> Prepared:
         What the scene's files hold.
     run : Run
         How it is computed.
+    is_estimated : bool, optional
+        As that of `prepare`.
 
     Returns
     -------
     Prepared
         The camera, ready to take its frame.
     """
+    form = _estimate if is_estimated else _prepare
     if not (solved.scene.moves and solved.exposure.is_timed_by_scene):
-        return _prepare(solved, picture, run)
+        return form(solved, picture, run)
     with run.stages("metering"):
-        metered = _prepare(solved.standing_still(), picture, run.unseen(run.rate_cache))
+        metered = form(solved.standing_still(), picture, run.unseen(run.rate_cache))
     once = cost_model.light_seconds(metered.layout, metered.spectrum, run.workers)
     timed = solved.timed(metered.exposure_time, metered.solved.gain, metered.times)
-    ready = _prepare(timed, picture, run.after(once))
+    ready = form(timed, picture, run.after(once))
     written = ready.solved.with_exposure(solved.exposure)
     return replace(ready, solved=written, exposure_limit=metered.exposure_limit)
 
@@ -119,6 +129,19 @@ def _prepare(solved: Solved, picture: ScenePicture, run: Run) -> Prepared:
     with run.stages("exposure"):
         exposed = expose(seen, light)
         return plan_frame(seen, light, exposed, run)
+
+
+def _estimate(solved: Solved, picture: ScenePicture, run: Run) -> Prepared:
+    """Return a plan's camera: its light is that of few places where the array is large."""
+    coarse = coarse_camera(solved)
+    if coarse is None:
+        return _prepare(solved, picture, run)
+    seen = scene_light(solved, picture, run)
+    with run.stages("exposure"):
+        light, exposed = estimated_light(seen, coarse, picture, run)
+        ready = plan_frame(seen, light, exposed, run)
+    g = coarse.layout.lattice
+    return replace(ready, estimated_places=g.rows * g.columns)
 
 
 def take(

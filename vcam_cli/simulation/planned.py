@@ -44,6 +44,7 @@ class PlannedRun:
     def report(self) -> dict[str, Any]:
         """Return what `vcam plan --json` prints."""
         found = dict(self.ready.plan.report())
+        found["estimated_places"] = self.ready.estimated_places
         if self.ready.times:
             found["captures"] = list(self.ready.times)
         if self.readout is not None:
@@ -78,7 +79,9 @@ class PlannedRun:
         return f"<PlannedRun {name}: {on} of {len(plan['effects'])} effects, {cost}>"
 
 
-def planned_run(camera: Camera, workers: int | None, watch: Observer) -> PlannedRun:
+def planned_run(
+    camera: Camera, workers: int | None, watch: Observer, is_exact: bool = False
+) -> PlannedRun:
     """Return the plan of a camera's frame.
 
     Parameters
@@ -89,6 +92,8 @@ def planned_run(camera: Camera, workers: int | None, watch: Observer) -> Planned
         Number of threads; None for a number that suits the array.
     watch : Observer
         Observer of the stages.
+    is_exact : bool, optional
+        Whether to form the light of all pixels, whatever their number.
 
     Returns
     -------
@@ -102,5 +107,5 @@ def planned_run(camera: Camera, workers: int | None, watch: Observer) -> Planned
     CannotDo
         Where memory does not suffice.
     """
-    ready, notes = prepare(camera, workers, watch)
+    ready, notes = prepare(camera, workers, watch, is_estimated=not is_exact)
     return PlannedRun(ready, notes, ready.solved.frame_rate, workers or threads(camera))

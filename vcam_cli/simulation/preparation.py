@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -72,6 +72,9 @@ class Prepared:
     of pixels that do not tell the halves of the lens apart."""
     sharing: Sharing | None
     """What pixels give to their neighbors; None where they give nothing."""
+    estimated_places: int = field(default=0, kw_only=True)
+    """Places of the coarse lattice whose light all rates are, in a plan that formed no image; 0
+    where they are the pixels'."""
 
     @property
     def camera(self) -> Camera:

@@ -135,7 +135,10 @@ def simulate(
 
 @own_float_errors
 def prepare(
-    camera: Camera, workers: int | None = None, watch: Observer | Callback | None = None
+    camera: Camera,
+    workers: int | None = None,
+    watch: Observer | Callback | None = None,
+    is_estimated: bool = False,
 ) -> tuple[Prepared, remarks.Notes]:
     """Return the camera ready to take its frame, and notes, as `vcam plan` shows.
 
@@ -147,6 +150,8 @@ def prepare(
         Number of threads, by default `threads`; results do not depend on it.
     watch : Observer or Callback or None, optional
         Follows the run: see `vcam_cli.progress.observer`.
+    is_estimated : bool, optional
+        Whether the light of few places of a large array suffices.
 
     Returns
     -------
@@ -164,7 +169,7 @@ def prepare(
         shared = RECENT.shared_with(camera)
         stages = Stages(watch=observer(watch))
         run = Run(workers or threads(camera), stages, shared.rate_cache)
-        ready, notes = pipeline.prepare(camera, run, shared)
+        ready, notes = pipeline.prepare(camera, run, shared, is_estimated)
         return ready, remarks.Notes(ready, notes)
     except BadInput as error:
         raise error.with_places(camera.locate) from None

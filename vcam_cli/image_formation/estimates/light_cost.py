@@ -14,6 +14,7 @@ from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.blurs import Blur, FieldTransfer, PlaneTransfer, SeparableTransfer
 from vcam_cli.effects.warps import Magnification, StillWarp, Warp
+from vcam_cli.image_formation.estimates import memory_model
 from vcam_cli.image_formation.estimates.bandwidth import FREQUENCY_SHARE, highest_passed, reach
 from vcam_cli.image_formation.estimates.chart_cells import (
     SURE,
@@ -291,14 +292,11 @@ def expected_report(
     if isinstance(scene, WAVES) or path.transfer.is_dark:
         return SpectrumReport()
     if not path.transfer.effects and not path.field and path.averages_over_box:
-        if not isinstance(scene, ChartScene):
-            return SpectrumReport(is_averaged=True, cells=math.prod(scene.shape))
-        edges = scene.chart.edge_seconds if scene.is_painted else 0.0
-        return SpectrumReport(is_averaged=True, is_painted=scene.is_painted, edge_seconds=edges)
+        return _averaged(path, scene)
     if isinstance(scene, ChartScene) and scene.chart.profile() is not None and not path.field:
         return SpectrumReport()
-    found = _sampled(path, scene)
     planes = min(PLANES, len(path.transfer.weights))
+    found = _sampled(path, scene, planes)
     directed = bool(of_kind(path.transfer.effects, PlaneTransfer))
     filters = MODES if path.field else PARITIES if directed else 1
     return replace(
@@ -313,14 +311,29 @@ def expected_report(
     )
 
 
-def _sampled(path: OpticalPath, scene: SampledScene) -> SpectrumReport:
-    """Return the cells of a scene and the predicted terms of its spectrum."""
+def _averaged(path: OpticalPath, scene: SampledScene) -> SpectrumReport:
+    """Return the report of means over the photodetectors."""
+    samples = 0 if isinstance(scene, ChartScene) else math.prod(scene.shape)
+    planes = len(path.transfer.level.T)
+    found = SpectrumReport(
+        is_averaged=True,
+        cells=samples,
+        memory=memory_model.box_average_bytes(samples, planes, path.geometry, path.settings),
+    )
+    if not isinstance(scene, ChartScene) or not scene.is_painted:
+        return found
+    return replace(found, is_painted=True, edge_seconds=scene.chart.edge_seconds)
+
+
+def _sampled(path: OpticalPath, scene: SampledScene, planes: int) -> SpectrumReport:
+    """Return the cells of a scene, the predicted terms of its spectrum and their memory."""
     g = path.geometry
     pixels = g.rows * g.columns
     if not isinstance(scene, ChartScene):
         end = min(highest_passed(path, scene), HIGHEST)
         cells, terms = math.prod(scene.shape), round(pixels * end**2)
-        return SpectrumReport(oversampling=end, cells=cells, terms=terms)
+        needed = memory_model.image_bytes(path, scene, end, planes, ())
+        return SpectrumReport(oversampling=end, cells=cells, terms=terms, memory=needed)
     widest = reach(path) + path.travel
     near = near_field(path, scene, widest)
     rings = far_parts(path, near, scene, widest)
@@ -330,11 +343,14 @@ def _sampled(path: OpticalPath, scene: SampledScene) -> SpectrumReport:
     end = BEYOND * 2 * max(g.pitch_x, g.pitch_y) * edges
     if scene.is_painted:
         highest = cells_per_pixel(path, near, highest).per_pixel
-        cells = math.prod(cell_grid(near, g, highest))
+        near = near.with_cells(cell_grid(near, g, highest))
+        cells = math.prod(near.shape)
+    highest = min(end, highest)
     return SpectrumReport(
-        oversampling=min(end, highest),
+        oversampling=highest,
         cells=cells,
-        terms=round(pixels * min(end, highest) ** 2),
+        terms=round(pixels * highest**2),
+        memory=memory_model.image_bytes(path, near, highest, planes, rings),
         is_painted=scene.is_painted,
         edge_seconds=scene.chart.edge_seconds if scene.is_painted else 0.0,
         far_parts=len(rings),
