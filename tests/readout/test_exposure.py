@@ -118,11 +118,11 @@ def test_a_longer_array_begins_like_a_shorter_one():
     assert np.array_equal(long[:128], short)
 
 
-def test_every_block_is_reported_once():
-    adc = Quantization(0.0, 1.0, 12)
-    seen = []
-    exposure.capture(np.ones((150, 8)), 1.0, (), adc, SEEDS, 3, done=seen.append)
-    assert sorted((s.start, s.stop) for s in seen) == [(0, 64), (64, 128), (128, 150)]
+def test_blocks_of_short_rows_flow_together():
+    runs = exposure.runs_of_rows(np.ones((20_000, 8)))
+    assert [(run.start, run.stop) for run in runs] == [(0, 8192), (8192, 16384), (16384, 20000)]
+    wide = exposure.runs_of_rows(np.ones((150, 3000)))
+    assert [(run.start, run.stop) for run in wide] == [(0, 64), (64, 128), (128, 150)]
     assert BLOCK_ROWS == 64
 
 

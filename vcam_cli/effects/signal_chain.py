@@ -14,7 +14,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.sensor.array import Binning
 from vcam_cli.effects.base import Effect, SignalLevels, of_kind
 from vcam_cli.physics import noise
-from vcam_cli.rng import coarse_normals
+from vcam_cli.rng import Stream, coarse_normals
 
 SIGMAS = 6.0
 """Standard deviations of the noise that count as its extremes."""
@@ -23,11 +23,11 @@ _KINDS_OF_VARIANCE = {"frame": "temporal", "sensor": "fixed-pattern"}
 
 @dataclass(frozen=True)
 class Site:
-    """Where a draw happens: a block of rows, and its random streams."""
+    """Where a draw happens: a block of rows, or several, and their random streams."""
 
     rows: int
     columns: int
-    stream: Callable[[str], np.random.Generator]
+    stream: Callable[[str], Stream]
     """Generator of a named stream for this block of rows."""
     line_stream: Callable[[str], np.random.Generator]
     """Generator of a named stream shared by all blocks, for draws per column."""
@@ -38,7 +38,7 @@ class Site:
     """Index of the block's first row in the array."""
     array_rows: int | None = None
     """Rows of the whole array; None where it ends with the block."""
-    sensor: Callable[[str], np.random.Generator] | None = None
+    sensor: Callable[[str], Stream] | None = None
     """Generator of a named stream for this block of what stays with the sensor, where that is
     another one than `stream`."""
     coarse_normals: bool = False
@@ -51,7 +51,7 @@ class Site:
         """Rows of the whole array."""
         return self.first_row + self.rows if self.array_rows is None else self.array_rows
 
-    def sensor_stream(self, name: str) -> np.random.Generator:
+    def sensor_stream(self, name: str) -> Stream:
         """Return the generator of a named stream of this block that stays with the sensor.
 
         Parameters
@@ -61,7 +61,7 @@ class Site:
 
         Returns
         -------
-        np.random.Generator
+        Generator or BlockStreams
             Generator; that of the frame where the sensor has none of its own.
         """
         return (self.sensor or self.stream)(name)

@@ -1,7 +1,8 @@
 """From the rate of electrons to a raw frame: charge, noise, saturation, codes.
 
-Blocks of 64 rows flow through all of it, a few rows at a time, while they are in the cache. Every
-draw has its own stream per block, so the frame does not depend on the number of workers.
+Blocks of 64 rows flow through all of it, a few rows at a time, or several blocks of short rows
+together, while they are in the cache. Every draw has its own stream per block, so the frame does
+not depend on the number of workers.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from vcam_cli.effects.signal_chain import (
     electron_effects,
 )
 from vcam_cli.parallel import each, slices_within
-from vcam_cli.rng import BLOCK_ROWS, blocks, stream
+from vcam_cli.rng import BLOCK_ROWS, Stream, runs_of_blocks, stream, streams
 
 AT_ONCE = 1 << 16
 """Pixels that flow together, about: a draw is made for them in the same order as for more."""
@@ -80,7 +81,7 @@ def sites(
     sample: int = 0,
     coarse_normals: bool = False,
 ) -> dict[str, Site]:
-    """Return the sites at which the noise of a block of rows is drawn, by scope.
+    """Return the sites at which the noise of a block of rows, or of several, is drawn, by scope.
 
     Streams of random numbers that were opened go on.
 
@@ -95,7 +96,7 @@ def sites(
     layer : int
         Index of the layer of stacked pixels.
     block : slice
-        Rows of the block.
+        Rows of the block, or of consecutive ones.
     sample : int, optional
         Index of the sample within one integration.
     coarse_normals : bool, optional
@@ -107,12 +108,13 @@ def sites(
         Site of each scope.
     """
     index = (layer << LAYER) + block.start // BLOCK_ROWS
-    sensor = _StreamCache(partial(stream, seeds["sensor"], block=index))
+    rows = block.stop - block.start
+    sensor = _StreamCache(partial(streams, seeds["sensor"], block=index, rows=rows))
     return {
         scope: Site(
-            rows=block.stop - block.start,
+            rows=rows,
             columns=rate.shape[1],
-            stream=_StreamCache(partial(stream, seed, capture=sample, block=index)),
+            stream=_StreamCache(partial(streams, seed, capture=sample, block=index, rows=rows)),
             line_stream=partial(stream, seed, capture=sample, block=layer << LAYER),
             dtype=rate.dtype.type,
             dark=dark,
@@ -125,14 +127,23 @@ def sites(
     }
 
 
+def runs_of_rows(rate: Array) -> list[slice]:
+    """Return the rows of an array (rows, columns) that flow together: whole blocks.
+
+    Several blocks of short rows: a block costs some calls for each effect, which is 90 % of the
+    time of two columns.
+    """
+    return runs_of_blocks(len(rate), AT_ONCE // rate.shape[1])
+
+
 @dataclass(frozen=True)
 class _StreamCache:
     """The streams of a block: each is opened once and then goes on."""
 
-    make: Callable[[str], np.random.Generator]
-    streams: dict[str, np.random.Generator] = field(default_factory=dict)
+    make: Callable[[str], Stream]
+    streams: dict[str, Stream] = field(default_factory=dict)
 
-    def __call__(self, name: str) -> np.random.Generator:
+    def __call__(self, name: str) -> Stream:
         if name not in self.streams:
             self.streams[name] = self.make(name)
         return self.streams[name]
@@ -163,7 +174,6 @@ def capture(
     adc: Quantizer,
     seeds: dict[str, int],
     workers: int,
-    done: Callable[[slice], None] | None = None,
     layer: int = 0,
     coarse_normals: bool = False,
     full_charge: Array | None = None,
@@ -187,8 +197,6 @@ def capture(
         Seeds of 'sensor' and 'frame'.
     workers : int
         Number of threads; results do not depend on it.
-    done : callable, optional
-        Function that is called with every block of rows that is finished.
     layer : int, optional
         Index of the layer of stacked pixels.
     coarse_normals : bool, optional
@@ -218,7 +226,7 @@ def capture(
         full = [None] * len(rate) if full_charge is None else full_charge
         layers = [
             capture(
-                *(plane, time, effects, adc, seeds, workers, None, number, coarse_normals, most),
+                *(plane, time, effects, adc, seeds, workers, number, coarse_normals, most),
                 settle=settle,
             )
             for number, (plane, most) in enumerate(zip(rate, full, strict=True))
@@ -250,10 +258,8 @@ def capture(
             )
             electrons[rows] = tile
             dn[rows] = codes(tile, effects, adc, here, None if pedestal is None else pedestal[rows])
-        if done is not None:
-            done(block)
 
-    each(shoot, blocks(len(rate)), workers)
+    each(shoot, runs_of_rows(rate), workers)
     return electrons, dn
 
 
@@ -394,5 +400,5 @@ def _charges(
                 tile = effect.apply(tile, here[effect.scope])
             out[rows] = tile
 
-    each(collect, blocks(len(rate)), workers)
+    each(collect, runs_of_rows(rate), workers)
     return out

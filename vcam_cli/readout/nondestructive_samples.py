@@ -37,7 +37,13 @@ from vcam_cli.effects.signal_chain import (
 )
 from vcam_cli.parallel import each
 from vcam_cli.readout.chain import ReadoutChain
-from vcam_cli.readout.exposure import codes_type, mean_dark, mean_electrons, sites
+from vcam_cli.readout.exposure import (
+    codes_type,
+    mean_dark,
+    mean_electrons,
+    runs_of_rows,
+    sites,
+)
 from vcam_cli.rng import blocks
 from vcam_cli.scheduling import estimators
 
@@ -112,7 +118,7 @@ def samples(
             dn[number, block] = adc.apply(read)
             before = time
 
-    each(shoot, blocks(len(rate)), workers)
+    each(shoot, runs_of_rows(rate), workers)
     return electrons, dn
 
 

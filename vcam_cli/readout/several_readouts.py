@@ -11,8 +11,14 @@ from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.signal_chain import ElectronEffect, NoiseSource, Site, electron_effects
 from vcam_cli.parallel import each, slices_within
 from vcam_cli.readout.chain import Branch, ReadoutChain
-from vcam_cli.readout.exposure import AT_ONCE, codes_type, mean_dark, mean_electrons, sites
-from vcam_cli.rng import blocks
+from vcam_cli.readout.exposure import (
+    AT_ONCE,
+    codes_type,
+    mean_dark,
+    mean_electrons,
+    runs_of_rows,
+    sites,
+)
 
 Sites = dict[str, Site]
 
@@ -84,7 +90,7 @@ def capture(
             dn[rows] = whole.adc.apply(merged)
             electrons[rows] = np.minimum(merged, rate.dtype.type(whole.circuit.full_well))
 
-    each(shoot, blocks(len(rate)), workers)
+    each(shoot, runs_of_rows(rate), workers)
     return SeveralReadouts(electrons, dn, codes)
 
 
