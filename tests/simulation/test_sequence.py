@@ -1,18 +1,20 @@
 """Sequences: time goes on, temporal noise is new, the sensor stays."""
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from making import QUIET, camera, radiance_for
+from making import GONE, QUIET, camera, radiance_for
 from typer.testing import CliRunner
 
-from vcam_cli import simulate
+from vcam_cli import plan, simulate
 from vcam_cli.commands.main import app
 from vcam_cli.errors import BadInput
 from vcam_cli.files.images.images import read_picture
+from vcam_cli.image_formation import photon_rate
 from vcam_cli.progress import Silent
-from vcam_cli.simulation import sequence
+from vcam_cli.simulation import cost_model, sequence
 from vcam_cli.simulation.sequence import frame_cameras
 
 WAVE = {"kind": "chart", "chart": "sinusoid", "frequency": "20 lp/mm"}
@@ -79,7 +81,7 @@ def test_a_lamp_flickers_on(tmp_path):
 
 @pytest.mark.parametrize(("speed", "lights"), [("0 m/s", 1), ("0.05 m/s", 6)])
 def test_memory_stays_and_still_scenes_have_one_light(speed, lights, tmp_path, monkeypatch):
-    """Frames of 12 kB, of which 30 kB are kept: two, however many follow each other."""
+    """One light is kept, however many frames follow each other."""
     kept, found, true = [], [], sequence.simulate
 
     def watched(each, workers, watch, shared, device, before):
@@ -94,11 +96,42 @@ def test_memory_stays_and_still_scenes_have_one_light(speed, lights, tmp_path, m
     source = WAVE | {"motion": {"x": speed}}
     made = camera(tmp_path, {"scene.source": source, "effects": QUIET})
     size = simulate(made).frame.rate.nbytes
-    monkeypatch.setattr(sequence, "LIGHT", 2 * size + size // 2)
     for _ in sequence.frames(made, 6, 40, 1, Silent()):
         pass
     assert len(set(found)) == lights
-    assert kept == [size * min(n, lights, 2) for n in range(1, 7)]
+    assert kept == [size] * 6
+
+
+@pytest.mark.parametrize(
+    ("speed", "exposure", "lights"),
+    [
+        ("0 m/s", {"time": "2 ms"}, 1),
+        ("0 m/s", {"auto": {"max": "5 ms"}}, 1),
+        ("0.05 m/s", {"time": "2 ms"}, 5),
+        ("0.05 m/s", {"auto": {"max": "5 ms"}}, 6),
+    ],
+)
+def test_planned_time_counts_every_light_once(speed, exposure, lights, tmp_path, monkeypatch):
+    """As many images as five frames form: a moving one is metered at rest first."""
+    formed, true = [], photon_rate.photo_rate
+
+    def counted(*arguments):
+        formed.append(1)
+        return true(*arguments)
+
+    source = WAVE | {"motion": {"x": speed}}
+    gone = {"exposure.time": GONE} if "auto" in exposure else {}
+    given = {f"exposure.{key}": value for key, value in exposure.items()}
+    made = camera(tmp_path, {"scene.source": source, "effects": QUIET} | gone | given)
+    found = plan(made)
+    monkeypatch.setattr(cost_model, "light_seconds", lambda *_: 10.0)
+    once = replace(found.ready.plan, seconds=3.0 + 10 * (2 if lights == 6 else 1))
+    found = replace(found, ready=replace(found.ready, plan=once))
+    assert sequence.planned_seconds(found, 5)[0] == pytest.approx(5 * 3 + 10 * lights)
+    monkeypatch.setattr(photon_rate, "photo_rate", counted)
+    for _ in sequence.frames(made, 5, 40, 1, Silent()):
+        pass
+    assert len(formed) == lights
 
 
 def test_exposures_have_to_fit(tmp_path):

@@ -87,6 +87,8 @@ def plan(
     details: Details = False,
     formats: options.Formats = None,
     device: PlannedDevice = "cpu",
+    frames: options.Frames = None,
+    fps: options.FrameRate = None,
 ) -> None:
     """Show the effects that a run simulates or skips, with reasons, and its time and memory.
 
@@ -100,6 +102,7 @@ def plan(
       vcam plan camera.yaml --accuracy 0.001 --json
       vcam plan starter --details
       vcam plan starter --geometry
+      vcam plan street --frames 100 --fps 12
       vcam plan double-gauss --lens
       vcam plan starter --scenes all
       vcam plan starter --scenes still-life --scenes my-scene.yaml
@@ -116,6 +119,8 @@ def plan(
         return
     if scenes and geometry:
         raise typer.BadParameter("--geometry is of one scene; leave out --scenes")
+    if (frames is None) != (fps is None):
+        raise typer.BadParameter("--frames and --fps go together: --frames 30 --fps 30")
     if (measure and not scenes) or (turns and not measure):
         raise typer.BadParameter("--turns needs --measure, and --measure needs --scenes")
     if scenes:
@@ -143,6 +148,12 @@ def plan(
         rate_of_frames = (
             f"{found.frames_per_second:.4g} frames/s, {most:.4g} at most: {found.readout.reason}"
         )
+    if frames is not None and fps is not None:
+        from vcam_cli.simulation.sequence import frame_cameras, planned_seconds
+
+        next(frame_cameras(model, frames, fps))  # refuses exposures that do not fit
+        whole, later = planned_seconds(found, frames)
+        report["sequence"] = {"frames": frames, "seconds": whole, "later_frame_seconds": later}
     if device != "cpu":
         cost = found.device_cost()
         report["device_seconds"], report["device_start"] = cost.first, cost.start
@@ -219,6 +230,7 @@ def facts(
         ("accuracy", f"rms error within {100 * report['settings']['tolerance']:.3g} % of signal"),
         ("cost", f"about {seconds:.2g} s and {memory:.0f} MB"),
         *([("device", _on_device(report))] if "device" in report else []),
+        *([("sequence", _sequence(report))] if "sequence" in report else []),
     ]
 
 
@@ -229,6 +241,15 @@ def _estimate(report: dict[str, Any], geometry: dict[str, Any]) -> str:
     return (
         f"exposure and noise from {places:,} means over {pixels:.3g} pixels each; a run decides on"
         " noise, charge and automatic exposure by the light of every pixel, as --details does"
+    )
+
+
+def _sequence(report: dict[str, Any]) -> str:
+    """Return what all frames of a sequence cost."""
+    whole = report["sequence"]
+    return (
+        f"{whole['frames']} frames, about {whole['seconds']:.2g} s:"
+        f" {whole['later_frame_seconds']:.2g} s for each after the first, in the same memory"
     )
 
 

@@ -24,8 +24,9 @@ from vcam_cli.files.images.video import VideoWriter, ffmpeg
 from vcam_cli.files.tables import write_table
 from vcam_cli.image_formation.rate_cache import RateCache
 from vcam_cli.progress import Observer
-from vcam_cli.simulation import exposure_control
+from vcam_cli.simulation import cost_model, exposure_control
 from vcam_cli.simulation.output import outputs
+from vcam_cli.simulation.planned import PlannedRun
 from vcam_cli.simulation.shared import Shared
 from vcam_cli.simulation.simulate import Result, simulate
 from vcam_cli.solve.idle_keys import sequence_notes
@@ -37,8 +38,8 @@ NO_VIDEO = (
     " strip.png show the sequence"
 )
 LIGHT = 1 << 24
-"""Bytes of light that are kept, the last always: nothing that moves is seen again in the light of
-an earlier frame, and what stands still has one light."""
+"""Bytes of light that are kept of what stands still, which has one light, or a few where exposures
+of a bracket overexpose it. Of what moves only the last is: it is never seen in that light again."""
 STRIP = 8
 """Frames of a strip, at most."""
 STRIP_WIDTH = 240
@@ -113,7 +114,7 @@ def frames(
         As that of `simulate`.
     """
     settings, reference = None, camera.exposure.reference
-    shared = Shared(RateCache(LIGHT))
+    shared = Shared(RateCache(0 if camera.scene.moves else LIGHT))
     solved = solve(camera)
     result: Result | None = None
     for each in frame_cameras(camera, count, rate):
@@ -127,6 +128,32 @@ def frames(
                 reference = result.exposure_time / 2 + solved.lines.last / 2
             settings = exposure_control.next_exposure(solved, result.frame)
         yield each, result
+
+
+def planned_seconds(planned: PlannedRun, count: int) -> tuple[float, float]:
+    """Return the estimated time of a sequence, and that of each frame after the first.
+
+    What stands still has one light for all frames; of what moves an automatic exposure meters the
+    first frame alone.
+
+    Parameters
+    ----------
+    planned : PlannedRun
+        Plan of the first frame.
+    count : int
+        Number of frames.
+
+    Returns
+    -------
+    whole, later : float
+        Seconds on this machine.
+    """
+    ready = planned.ready
+    light = cost_model.light_seconds(ready.layout, ready.spectrum, planned.workers)
+    first, scene = ready.plan.seconds, ready.solved.scene
+    once = not scene.moves or ready.solved.exposure.is_timed_by_scene
+    later = max(first - light, 0.0) if once else first
+    return first + (count - 1) * later, later
 
 
 def write_sequence(
