@@ -100,7 +100,7 @@ class BlockStreams:
         return self._fill(np.empty(size), lambda part: draw(out=part))
 
     def random_raw(self, rows: int, words: int) -> Array:
-        """Return so many words of 64 random bits a row (rows, words)."""
+        """Return words of 64 random bits, a number of them a row (rows, words)."""
         draw = self._generator.bit_generator.random_raw
 
         def fill(part: Array) -> None:

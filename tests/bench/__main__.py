@@ -17,6 +17,7 @@ standard normal per pixel for each of five noise sources. The parts, by default 
     growth       how time grows with pixels
     schedules    best sampling schedules, over R_compute
     command      `vcam run` beside the bare imports
+    cheap        plans at 50 MP, sequences, tall arrays, start-up of commands
     repeated     data sets, loops, sweeps of small frames, commands without frames, old and new
 
 Figures are medians of repeated runs in one process, once by the wall clock and once by the time of

@@ -107,8 +107,7 @@ PEAK = """
 import sys
 from pathlib import Path
 from vcam_cli import load, simulate
-result = simulate(load(sys.argv[1]))
-result.render, result.metrics
+{work}
 status = Path("/proc/self/status")
 if status.exists():  # ru_maxrss begins with that of the process that started this one
     line = next(x for x in status.read_text().splitlines() if x.startswith("VmHWM"))
@@ -117,12 +116,16 @@ else:
     import resource
     print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
-"""A frame, its render and metrics in a process of its own, which prints its peak memory [bytes]."""
+"""A process that does some work and prints its peak memory [bytes]."""
+FRAME = "result = simulate(load(sys.argv[1])); result.render, result.metrics"
 
 
-def peak_memory(camera: str) -> int:
-    """Peak memory of a process that takes a frame of a camera file, with its metrics [bytes]."""
-    command = [sys.executable, "-c", PEAK, camera]
+def peak_memory(*arguments: str, work: str = FRAME) -> int:
+    """Peak memory of a process that takes a frame of a camera file, with its metrics [bytes].
+
+    work: what it does in place of that, with the arguments in `sys.argv`.
+    """
+    command = [sys.executable, "-c", PEAK.replace("{work}", work), *arguments]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     return int(done.stdout)
 

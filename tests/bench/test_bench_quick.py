@@ -6,7 +6,7 @@ import subprocess
 
 import numpy as np
 import pytest
-from bench import plain, repeated, sections
+from bench import cheap, plain, repeated, sections
 from bench.__main__ import main
 from bench.cameras import BUSY, PLAIN, studio
 from bench.measure import Cost, Frames, Yardstick, median, peak_memory, start_cost, take_turns
@@ -25,6 +25,7 @@ TINY = Size(
     wavelengths=31,
     points=20,
     repeated=(2, 4, 8),
+    cheap=((600, 600), 400, 2),
     levels=64,
     effects=("shot_noise", "off_axis"),
     scenes=(),
@@ -45,6 +46,8 @@ def found():
         patch.setattr(repeated, "start_cost", lambda work, folder: Cost(len(work), len(work)))
         patch.setattr(repeated, "forecast_ratio", lambda sets, out: 1.1)
         patch.setattr(repeated, "scheduler_growth", lambda points: 1.0)
+        patch.setattr(cheap, "start_cost", lambda work, folder: Cost(len(work), len(work)))
+        patch.setattr(cheap, "peak_memory", lambda *_, work: 200_000_000)
         patch.setattr(sections, "peak_memory", lambda camera: 1_000_000_000)
         yield measure(TINY)
 
@@ -69,11 +72,12 @@ def test_every_part_is_there(found):
     for word in (
         "frame over R_compute", "shares", "shipped", "photograph", "eight layers",
         "plain NumPy", "wavelengths", "without", "sweep", "growth", "schedules", "command",
-        "data set", "forecast", "Dask",
+        "data set", "forecast", "Dask", "plan of", "sequences", "2 columns", "processes",
     ):  # fmt: skip
         assert word in titles
-    # Frames have their shares besides, layers another denominator, and what is repeated six.
-    assert len(PARTS) == len(found["sections"]) - 7
+    # Frames have their shares besides, layers another denominator, what is repeated six, and what
+    # is cheap four.
+    assert len(PARTS) == len(found["sections"]) - 10
     assert set(found["sections"]["frame over the same without"]) == set(TINY.effects)
     (camera,) = found["sections"]["frame time over R_compute, shipped cameras"]
     assert camera.startswith("csf-monochrome, ")

@@ -13,6 +13,7 @@ from vcam_cli.parallel import available_workers
 
 from . import sections
 from .cameras import BUSY, Studio, studio
+from .cheap import cheap
 from .measure import Cost, Yardstick, yardstick
 from .repeated import repeated
 from .sections import Section
@@ -39,6 +40,8 @@ class Size:
     levels: int = 65_536
     repeated: tuple[int, int, int] = (12, 200, 400)
     """Frames of a loop, and points of a sweep of small frames."""
+    cheap: tuple[tuple[int, int], int, int] = ((5792, 8688), 1_000_000, 20)
+    """Array of a plan, long side of a thin array, and frames of a sequence."""
     effects: tuple[str, ...] = ()
     """Some of the effects; () for all."""
     varied: tuple[str, ...] = ()
@@ -160,6 +163,10 @@ def _repeated(bench: Bench) -> dict[str, Section]:
     return repeated(bench.size.few, *bench.size.repeated)
 
 
+def _cheap(bench: Bench) -> dict[str, Section]:
+    return cheap(bench.size.few, *bench.size.cheap)
+
+
 PARTS: dict[str, Callable[[Bench], dict[str, Section]]] = {
     "frames": _frames,
     "shipped": _shipped,
@@ -173,6 +180,7 @@ PARTS: dict[str, Callable[[Bench], dict[str, Section]]] = {
     "schedules": _schedules,
     "command": _command,
     "repeated": _repeated,
+    "cheap": _cheap,
 }
 
 

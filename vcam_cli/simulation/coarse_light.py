@@ -128,7 +128,7 @@ def estimated_light(
     geometry = seen.solved.geometry
     memory.require(expected.memory, geometry.rows, geometry.columns)
     few = scene_light(coarse, picture, run.unseen())
-    # A wide aperture stands for the photodetector's, whether that one is left out or not.
+    # The wide aperture replaces the photodetector's, whether that one is skipped or not.
     path = replace(plan.reduced(few.path), optional=())
     light = photon_rate.photo_rate(path, few.scene, coarse.layout.planes)
     light = replace(light, plan=plan, spectrum=expected)
