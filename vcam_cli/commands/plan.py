@@ -138,7 +138,7 @@ def plan(
 
     model = load(camera, options.overrides(set_, accuracy=accuracy))
     with Progress(quiet) as progress:
-        found = face.plan(model, workers, progress, details)
+        found = face.plan(model, workers, progress, details or geometry)
     for note in found.notes:
         options.say(note, quiet)
     report, solved = found.report(), found.geometry

@@ -33,7 +33,10 @@ class PlannedRun:
 
     @property
     def geometry(self) -> dict[str, float | int]:
-        """Name -> value of the solved geometry, in SI units."""
+        """Name -> value of the solved geometry, in SI units.
+
+        Of a plan that formed no image the samples per pixel are those expected.
+        """
         return self.ready.layout.report(self.ready.spectrum.oversampling)
 
     @property
