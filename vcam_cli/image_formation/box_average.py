@@ -75,6 +75,10 @@ def _chart_averages(
 ) -> Array:
     """Paint the chart on cells that are the collecting areas, and the gaps between them."""
     centers = pixel_centers(geometry, detector=True)
+    mix = np.asarray(mix, scene.dtype)
+    found = scene.chart.box_averages(*centers, size, mix)
+    if found is not None:
+        return found
     if any(
         len(c) > 1 and c[1] - c[0] < s * (1 - SLIVER) for c, s in zip(centers, size, strict=True)
     ):
@@ -82,7 +86,6 @@ def _chart_averages(
     (x_edges, step_x), (y_edges, step_y) = (
         _edges(c, s) for c, s in zip(centers, size, strict=True)
     )
-    mix = np.asarray(mix, scene.dtype)
     out = np.empty((len(mix), geometry.rows, geometry.columns), scene.dtype)
     for rows in bands_of_rows(geometry.rows, len(x_edges)):
         cells = y_edges[rows.start * step_y : (rows.stop - 1) * step_y + 2]
@@ -100,7 +103,6 @@ def _overlapping_averages(
     """
     grids = [_grid(c, s) for c, s in zip(centers, size, strict=True)]
     (x_edges, left, right), (y_edges, top, bottom) = grids
-    mix = np.asarray(mix, scene.dtype)
     out = np.empty((len(mix), len(centers[1]), len(centers[0])), scene.dtype)
     for rows in bands_of_rows(len(centers[1]), len(x_edges)):
         first, last = int(top[rows.start]), math.ceil(bottom[rows.stop - 1])

@@ -25,10 +25,7 @@ from vcam_cli.image_formation.estimates.bandwidth import axes
 from vcam_cli.image_formation.field_dependence import Mode, filtered_layers
 from vcam_cli.image_formation.filtering import Filter
 from vcam_cli.image_formation.optical_path import Layer, OpticalPath
-from vcam_cli.image_formation.scene_spectrum import (
-    SceneSpectrum,
-    transform_painted,
-)
+from vcam_cli.image_formation.scene_spectrum import SceneSpectrum, transform_planes
 from vcam_cli.scenes.base import ChartScene
 
 NEAR = 12.0
@@ -83,7 +80,9 @@ class FarPart:
         pixels = geometry.pitch_x / self.scene.pitch_x, geometry.pitch_y / self.scene.pitch_y
         return max(pixels)
 
-    def spectrum(self, path: OpticalPath, highest: float, mix: Array) -> SceneSpectrum:
+    def spectrum(
+        self, path: OpticalPath, highest: float, mix: Array, planes: Array | None
+    ) -> SceneSpectrum:
         """Return the spectrum of its planes, in 64 bits.
 
         Parameters
@@ -94,18 +93,24 @@ class FarPart:
             Frequency at which the near field's filter ends [pixel Nyquist].
         mix : Array
             Mixtures (R, K) of the scene's components.
+        planes : Array or None
+            What is painted of them (R, ny, nx); None of a scene in closed form.
 
         Returns
         -------
         SceneSpectrum
             Spectrum of R planes.
         """
-        x, y = axes(path, self.scene, highest)
-        if not self.is_painted:
+        if planes is None:
+            x, y = axes(path, self.scene, highest)
             return closed_spectrum(self.scene, mix, (y, x), np.float64)
-        terms = y.terms, x.terms
-        spectrum, _ = transform_painted(self.scene, mix, terms, np.float64, path.workers)
-        return spectrum
+        return transform_planes(planes.astype(np.float64), path.workers)
+
+    def middle_of(self, planes: Array) -> Array:
+        """Return its cells (R, ny, nx) of those of the rectangle around it."""
+        top, left = ((a - b) // 2 for a, b in zip(planes.shape[1:], self.scene.shape, strict=True))
+        ny, nx = self.scene.shape
+        return planes[:, top : top + ny, left : left + nx]
 
     def image_filter(self, near: Filter, path: OpticalPath, highest: float) -> Filter:
         """Return the filter for this part, with the ring's low-pass and the sign.
@@ -196,8 +201,14 @@ class FarField:
         Layer
             Share of the signal [e/s].
         """
+        mix, planes = self.near.tables.mix, None
         for number, part in enumerate(self.parts):
-            spectrum = part.spectrum(self.path, self.highest, self.near.tables.mix)
+            # Painted once: what both rectangles show, the same but for rounding, cancels.
+            if part.sign > 0:
+                planes = part.scene.planes(mix, self.path.workers) if part.is_painted else None
+            elif planes is not None:
+                planes = part.middle_of(planes)
+            spectrum = part.spectrum(self.path, self.highest, mix, planes)
             image_filter = part.image_filter(self.near, self.path, self.highest)
             own = modes if number < followed else ()
             yield from filtered_layers(image_filter, own, spectrum, self.path.workers)

@@ -62,6 +62,7 @@ class ByteCache(Generic[T]):
     def __init__(self, limit: int, strict: bool = False) -> None:
         self._limit, self._least = limit, 0 if strict else 1
         self._kept: OrderedDict[Hashable, T] = OrderedDict()
+        self._sizes: dict[Hashable, int] = {}
         self._lock = Lock()
 
     def __reduce__(self) -> tuple[type[ByteCache[T]], tuple[int, bool]]:
@@ -92,16 +93,18 @@ class ByteCache(Generic[T]):
         value = compute()
         with self._lock:
             self._kept[key] = value
+            self._sizes[key] = value.nbytes
             while len(self._kept) > self._least and self.nbytes > self._limit:
-                self._kept.popitem(last=False)
+                del self._sizes[self._kept.popitem(last=False)[0]]
         return value
 
     def clear(self) -> None:
         """Keep nothing."""
         with self._lock:
             self._kept.clear()
+            self._sizes.clear()
 
     @property
     def nbytes(self) -> int:
         """Memory that the results take [bytes]."""
-        return sum(value.nbytes for value in self._kept.values())
+        return sum(self._sizes.values())

@@ -336,6 +336,27 @@ class Chart(ABC):
             Values (R, len(y), len(x)), in the unit of `mix`.
         """
 
+    def box_averages(
+        self, x: Array, y: Array, size: tuple[float, float], mix: Array
+    ) -> Array | None:
+        """Return the averages over boxes, if a chart knows them other than by cells with edges.
+
+        Parameters
+        ----------
+        x, y : Array
+            Centers of the boxes along the rows and columns, rising [m].
+        size : tuple of float
+            Width and height of the boxes, which may overlap [m].
+        mix : Array
+            Mixtures (R, K) of the parts; their type is that of the result.
+
+        Returns
+        -------
+        Array or None
+            Averages (R, len(y), len(x)), in the unit of `mix`; None where `paint` serves.
+        """
+        return None
+
     def crop_to_cells(self, x_edges: Array, y_edges: Array) -> "Chart":
         """Return a chart that looks the same on these cells, if one is faster there.
 

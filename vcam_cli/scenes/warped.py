@@ -1,8 +1,9 @@
 """A chart as a lens images it that displaces what it images.
 
-Cells of the sensor see parts of the chart that are no rectangles. Each is taken as two boxes, side
-by side along a diagonal, that have its center and its second moments. The chart is painted on finer
-cells, whose sums from the corner on give the mean over any box by four of their values.
+Cells of the sensor see parts of the chart that are no rectangles. The chart is painted flat, as
+means over overlapping squares; between them a cubic spline gives the mean over a square anywhere.
+What a cell sees is taken as one square about its center, where it is nearly one, and else as four
+that have its second moments together.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,13 +27,16 @@ SLIVER = 1e-6
 MOST_PARTS = 4
 """Parts along each side of a cell, at most: of the far field's wide cells, waves that go into one
 once, twice or three times still leave nothing."""
-TILE = 128
-"""Cells along each side that are painted at once: over them the lens's scale hardly changes."""
-FINER = 2.0
-"""Finer cells along the side of the smallest box: an edge between them moves no center, and blurs
-by a quarter of what the box does, in second moments."""
+TILE = 320
+"""Cells along each side that are painted at once, more than the rows of a band of two megapixels:
+over them the lens's scale hardly changes."""
+FINER = 2
+"""Painted cells along the side of a square: a spline between squares so close errs by 6e-5 of a
+wave with five pixels in a period, where they are as large as 0.8 pixels."""
+BEYOND = 10
+"""Painted cells around those that are seen: a spline's ends change it by 0.27 a cell."""
 MOST_FINER = 8.0
-"""Finer cells in a tile over its cells times `FINER` squared, at most: it is halved beyond."""
+"""Painted cells of a tile over its cells times `FINER` squared, at most: it is halved beyond."""
 POINTS = 4.0
 """Points of a chart along the distance of the nearest requested ones: between them its
 values are interpolated linearly."""
@@ -39,15 +44,43 @@ DEGREES = (16, 32, 64, 128)
 """Degrees of the series of a map that are tried."""
 PRECISE = 1e-11
 """Coefficients over the largest that a series does without: 1e-7 pixels of 10,000."""
-MOST_APART = 0.3
-"""Part of the second moments along x and y that the distance of two boxes makes, at most."""
-ROUND = 1e-3
-"""Distance of two boxes below which they are one [finer cells]."""
-LOOKS = 33
-"""Places along each side of the map at which its scale is looked at."""
+LOOKS, LOOKS_IN_TILE = 33, 5
+"""Places along each side of a map, and of a tile, at which its scale is looked at."""
+TINY = 1e-30
+"""Less than any second moment that counts."""
+CORNERS = ((-1, -1), (-1, 1), (1, -1), (1, 1))
+"""Signs of the ways to four squares."""
+PAIRS = ((0, 0), (1, 1), (0, 1))
+"""Axes of the elements of a symmetric matrix of two rows."""
 
 Places = Callable[[Array, Array], tuple[Array, Array]]
 """From places x, y of one shape to where they look [m]; NaN for those that see nothing."""
+
+
+class Moments(NamedTuple):
+    """Second moments of areas along x, along y, and across."""
+
+    xx: Array
+    yy: Array
+    xy: Array
+
+    @property
+    def ends(self) -> tuple[Array, Array]:
+        """Least and largest in any direction."""
+        middle = (self.xx + self.yy) / 2
+        apart = np.hypot((self.xx - self.yy) / 2, self.xy)
+        return middle - apart, middle + apart
+
+    def beyond(self, square: float) -> Moments:
+        """Return what is left of them without a square's."""
+        return Moments(self.xx - square, self.yy - square, self.xy)
+
+    @property
+    def root(self) -> Moments:
+        """Square root of the symmetric matrix that they are."""
+        root = np.sqrt(np.maximum(self.xx * self.yy - self.xy**2, 0.0))
+        scale = np.sqrt(np.maximum(self.xx + self.yy + 2 * root, TINY))
+        return Moments((self.xx + root) / scale, (self.yy + root) / scale, self.xy / scale)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,55 +97,73 @@ class SmoothMap:
 
     def on_grid(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Return where the places of columns x (n,) and rows y (m,) [m] look: two of (m, n) [m]."""
-        along_x, beyond_x = self._terms(x, self.half[0])
-        along_y, beyond_y = self._terms(y, self.half[1])
-        found_x, found_y = (product(product(along_y, s), along_x.T) for s in self.series)
-        found_x += self._slopes[0] * beyond_x
-        found_y += self._slopes[1] * beyond_y[:, None]
+        inside_x, inside_y = (np.clip(a, -h, h) for a, h in zip((x, y), self.half, strict=True))
+        found_x, found_y = self._sums(self.series, inside_x, inside_y)
+        found_x += self._slopes[0] * (x - inside_x)
+        found_y += self._slopes[1] * (y - inside_y)[:, None]
         return found_x, found_y
 
-    def _terms(self, at: Array, half: float) -> tuple[Array, Array]:
-        inside = np.clip(at, -half, half)
-        terms = np.polynomial.chebyshev.chebvander(inside / half, self.series.shape[1] - 1)
-        return terms, at - inside
+    def seen_moments(self, x: Array, y: Array, size: tuple[float, float] = (1.0, 1.0)) -> Moments:
+        """Return the second moments of what cells about columns x (n,), rows y (m,) see.
+
+        They are those of one that looks straight at the chart: 1, 1 and 0.
+        """
+        inside_x, inside_y = (np.clip(a, -h, h) for a, h in zip((x, y), self.half, strict=True))
+        along_x, along_y = (
+            [part * (length / own) for part, own in zip(sums, size, strict=True)]
+            for sums, length in zip(
+                (self._sums(series, inside_x, inside_y) for series in self._derivatives),
+                size,
+                strict=True,
+            )
+        )
+        return Moments(*(along_x[i] * along_x[j] + along_y[i] * along_y[j] for i, j in PAIRS))
+
+    def _sums(self, series: Array, x: Array, y: Array) -> tuple[Array, Array]:
+        """Return both sums (m, n) of series (2, k, l) at places of the rectangle."""
+        along_x, along_y = (
+            np.polynomial.chebyshev.chebvander(at / half, count - 1)
+            for at, half, count in zip((x, y), self.half, series.shape[:0:-1], strict=True)
+        )
+        found_x, found_y = (product(product(along_y, each), along_x.T) for each in series)
+        return found_x, found_y
+
+    @cached_property
+    def _derivatives(self) -> tuple[Array, Array]:
+        """Series of the derivatives along x and y."""
+        along_x, along_y = (
+            np.polynomial.chebyshev.chebder(self.series, scl=1 / half, axis=axis)
+            for half, axis in zip(self.half, (2, 1), strict=True)
+        )
+        return along_x, along_y
 
     @cached_property
     def _slopes(self) -> tuple[float, float]:
         """Mean scale along both axes."""
         ends = np.array([-1.0, 1.0])
-        x, y = self.on_grid_inside(ends * self.half[0], ends * self.half[1])
+        x, y = self._sums(self.series, ends * self.half[0], ends * self.half[1])
         return (
             float((x[:, 1] - x[:, 0]).mean() / (2 * self.half[0])),
             float((y[1] - y[0]).mean() / (2 * self.half[1])),
         )
 
-    def on_grid_inside(self, x: Array, y: Array) -> tuple[Array, Array]:
-        """Return the same of places that lie in the rectangle."""
-        along_x, along_y = self._terms(x, self.half[0])[0], self._terms(y, self.half[1])[0]
-        found_x, found_y = (product(product(along_y, s), along_x.T) for s in self.series)
-        return found_x, found_y
-
     @cached_property
-    def _jacobian(self) -> tuple[Array, Array]:
-        """Derivatives of the places seen (2, m, n) along x and along y, at some places."""
+    def _squared_scales(self) -> tuple[Array, Array]:
+        """Squares of the lesser and the larger scale at some places."""
         x, y = (np.linspace(-1, 1, LOOKS) * half for half in self.half)
-        seen = np.array(self.on_grid_inside(x, y))
-        return np.gradient(seen, x, axis=2), np.gradient(seen, y, axis=1)
+        return self.seen_moments(x, y).ends
 
     @cached_property
     def scales(self) -> tuple[float, float]:
         """Mean of the larger scale over the rectangle, and the largest: lengths seen over own."""
-        jacobian = np.moveaxis(np.array(self._jacobian), (0, 1), (-1, -2))
-        larger = np.linalg.svd(jacobian, compute_uv=False)[..., 0]
+        larger = np.sqrt(self._squared_scales[1])
         return float(larger.mean()), float(larger.max())
 
     @cached_property
-    def skew(self) -> float:
-        """Largest second moment across x and y of what a square sees, over its mean one."""
-        along_x, along_y = self._jacobian
-        moments = [along_x[i] * along_x[j] + along_y[i] * along_y[j] for i, j in ((0, 0), (1, 1))]
-        across = along_x[0] * along_x[1] + along_y[0] * along_y[1]
-        return float(np.abs(2 * across / (moments[0] + moments[1])).max())
+    def elongation(self) -> float:
+        """Square of the larger scale over that of the lesser, less 1, where they differ most."""
+        least, most = self._squared_scales
+        return float((most / np.maximum(least, 1e-12)).max()) - 1
 
 
 def smooth_map(places: Places, half: tuple[float, float]) -> SmoothMap | None:
@@ -150,7 +201,12 @@ class WarpedChart(Chart):
     sees: SmoothMap
     """Where places of the sensor look."""
     widest: float = math.inf
-    """Largest width of cells represented by boxes; wider ones are painted in parts [m]."""
+    """Largest width of cells represented by squares; wider ones are painted in parts [m]."""
+    sharp: float = math.inf
+    """The same of boxes that nothing blurs [m]."""
+    alike: float = math.inf
+    """Largest difference of the second moments of what a cell sees from those of one square, back
+    on the sensor [m2]."""
 
     edge_seconds = property(lambda self: self.chart.edge_seconds)
     undivided = property(lambda self: min(self.chart.undivided / self.sees.scales[1], self.widest))
@@ -187,63 +243,91 @@ class WarpedChart(Chart):
         return densest.scaled(self.sees.scales[0])
 
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
-        """Write the averages over the cells between edges into an array."""
-        width = max(float(np.diff(edges[:2])[0]) for edges in (x_edges, y_edges))
-        parts = min(math.ceil(width / self.widest - SLIVER), MOST_PARTS)
-        if parts > 1:
-            self._paint_in_parts(x_edges, y_edges, mix, out, parts)
-        else:
-            self._paint_tiles(x_edges, y_edges, mix, out)
+        """Write the averages over the cells between edges, of one size, into an array."""
+        x, y = ((edges[1:] + edges[:-1]) / 2 for edges in (x_edges, y_edges))
+        width, height = ((e[-1] - e[0]) / (len(e) - 1) for e in (x_edges, y_edges))
+        size = width, height
+        count = max(1, min(math.ceil(max(size) / self.widest - SLIVER), MOST_PARTS))
+        self._paint(x, y, size, count, mix, out)
 
-    def _paint_tiles(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
-        for rows in pieces(len(y_edges) - 1, TILE):
-            for columns in pieces(len(x_edges) - 1, TILE):
-                self._paint_tile(
-                    x_edges[columns.start : columns.stop + 1],
-                    y_edges[rows.start : rows.stop + 1],
-                    mix,
-                    out[:, rows, columns],
-                )
+    def box_averages(self, x: Array, y: Array, size: tuple[float, float], mix: Array) -> Array:
+        """Return the averages over boxes about places, which may overlap: (R, len(y), len(x))."""
+        out = np.empty((len(mix), len(y), len(x)), mix.dtype)
+        count = max(1, math.ceil(max(size) / min(self.sharp, self.widest) - SLIVER))
+        self._paint(x, y, size, count, mix, out)
+        return out
 
-    def _paint_in_parts(
-        self, x_edges: Array, y_edges: Array, mix: Array, out: Array, parts: int
+    def _paint(
+        self,
+        x: Array,
+        y: Array,
+        size: tuple[float, float],
+        count: int,
+        mix: Array,
+        out: Array,
     ) -> None:
-        """Write the means over `parts` parts along each side of every cell."""
-        x, y = (
-            np.interp(np.arange(parts * (len(e) - 1) + 1) / parts, np.arange(len(e)), e)
-            for e in (x_edges, y_edges)
-        )
-        for rows in pieces(len(y_edges) - 1, TILE):
-            y_parts = y[parts * rows.start : parts * rows.stop + 1]
-            planes = np.empty((len(mix), len(y_parts) - 1, len(x) - 1), mix.dtype)
-            self._paint_tiles(x, y_parts, mix, planes)
-            out[:, rows] = cell_means(planes, parts)
+        """Write the averages over cells of one size about columns and rows of places.
 
-    def _paint_tile(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
-        boxes = _Boxes.of_cells(self.sees.on_grid(x_edges, y_edges))
-        pitch = [least / FINER for least in boxes.least]
-        first, last = boxes.ends
-        counts = [math.ceil((b - a) / p) + 2 for a, b, p in zip(first, last, pitch, strict=True)]
-        cells = (len(x_edges) - 1, len(y_edges) - 1)
-        if math.prod(counts) > MOST_FINER * FINER**2 * (math.prod(cells) + TILE):
-            axis = int(cells[1] > cells[0])
-            if cells[axis] > 1:
-                self._paint_halves((x_edges, y_edges), mix, out, axis)
-                return
-        x, y = (a - p + p * np.arange(n + 1) for a, p, n in zip(first, pitch, counts, strict=True))
+        Those of `count` parts along each side of a cell are averaged.
+        """
+        parts = (np.arange(count) + 0.5) / count - 0.5
+        x, y = (np.add.outer(at, w * parts) for at, w in zip((x, y), size, strict=True))
+        for rows in pieces(len(y), max(1, TILE // count)):
+            for columns in pieces(len(x), max(1, TILE // count)):
+                tile = x[columns].ravel(), y[rows].ravel()
+                found = self._tile(tile, (size[0] / count, size[1] / count), mix)
+                out[:, rows, columns] = cell_means(found, count)
+
+    def _tile(self, places: tuple[Array, Array], size: tuple[float, float], mix: Array) -> Array:
+        """Return the averages (R, m, n) over cells about columns and rows of places."""
+        centers = self.sees.on_grid(*places)
+        side, ways = self._squares(places, size)
+        grids = [
+            _Grid.around([c + way[axis] for way in ways], side * size[axis] / FINER)
+            for axis, c in enumerate(centers)
+        ]
+        painted = math.prod(grid.count for grid in grids)
+        axis = int(len(places[1]) > len(places[0]))
+        if painted > MOST_FINER * FINER**2 * (centers[0].size + TILE) and len(places[axis]) > 1:
+            halves = (self._tile(half, size, mix) for half in _halves(places, axis))
+            return np.concatenate(list(halves), axis=2 - axis)
+        x, y = (grid.edges for grid in grids)
         planes = self.chart.crop_to_cells(x, y).averages(x, y, mix)
-        out[:] = _box_means(planes, (x, y), boxes)
+        splines = [
+            ndimage.spline_filter(_square_means(plane), output=plane.dtype, mode="mirror")
+            for plane in planes
+        ]
+        out = np.zeros((len(mix), *centers[0].shape), mix.dtype)
+        for way in ways:
+            column, row = (g.index(c + w) for g, c, w in zip(grids, centers, way, strict=True))
+            for found, spline in zip(out, splines, strict=True):
+                found += ndimage.map_coordinates(
+                    spline, (row, column), output=spline.dtype, mode="mirror", prefilter=False
+                )
+        out /= len(ways)
+        return out
 
-    def _paint_halves(self, edges: tuple[Array, Array], mix: Array, out: Array, axis: int) -> None:
-        """Paint a tile in two parts, across one axis."""
-        cells = len(edges[axis]) - 1
-        for part in (slice(0, cells // 2), slice(cells // 2, cells)):
-            x, y = edges
-            own = edges[axis][part.start : part.stop + 1]
-            if axis == 0:
-                self._paint_tile(own, y, mix, out[:, :, part])
-            else:
-                self._paint_tile(x, own, mix, out[:, part])
+    def _squares(
+        self, places: tuple[Array, Array], size: tuple[float, float]
+    ) -> tuple[float, Sequence[tuple[Array, Array]]]:
+        """Return the side of squares over that of the cells, and where they lie about the centers.
+
+        There is one square where it has nearly the second moments of what the cells see.
+        """
+        x, y = places
+        few_x, few_y = (np.linspace(at[0], at[-1], LOOKS_IN_TILE) for at in places)
+        least, most = self.sees.seen_moments(few_x, few_y, size).ends
+        low, high = float(least.min()), float(most.max())
+        if (high - low) / 2 * max(size) ** 2 / 12 <= self.alike:
+            return math.sqrt((low + high) / 2), [(np.zeros(1), np.zeros(1))]
+        moments = self.sees.seen_moments(x, y, size)
+        low = float(moments.ends[0].min())
+        root = moments.beyond(low).root
+        width, height = (length / math.sqrt(12) for length in size)
+        return math.sqrt(low), [
+            (width * (a * root.xx + b * root.xy), height * (a * root.xy + b * root.yy))
+            for a, b in CORNERS
+        ]
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the values (R, len(y), len(x)) at points, straight between closely spaced ones."""
@@ -270,100 +354,41 @@ class WarpedChart(Chart):
 
 
 @dataclass(frozen=True)
-class _Boxes:
-    """What cells see of a chart: boxes of one size, in pairs about a center."""
+class _Grid:
+    """Painted cells along an axis, and the squares on them."""
 
-    x: Array
-    """Centers of the pairs (m, n) [m]."""
-    y: Array
-    width: Array
-    """Square roots of twelve times the second moments, widths of a single box (m, n) [m]."""
-    height: Array
-    across: Array
-    """Second moment across x and y [m2]."""
+    first: float
+    """Edge of the first cell [m]."""
+    pitch: float
+    """Width of a cell [m]."""
+    count: int
+    """Cells of squares about the places that are seen, without those around them."""
 
     @classmethod
-    def of_cells(cls, corners: tuple[Array, Array]) -> _Boxes:
-        """Return the boxes of cells whose corners (m + 1, n + 1) look at places x, y [m]."""
-        centers, along_x, along_y = [], [], []
-        for seen in corners:
-            left = seen[1:] + seen[:-1]
-            top = seen[:, 1:] + seen[:, :-1]
-            along_x.append((left[:, 1:] - left[:, :-1]) / 2)
-            along_y.append((top[1:] - top[:-1]) / 2)
-            centers.append((left[:, 1:] + left[:, :-1]) / 4)
-        (x, y), (width, height) = centers, (np.hypot(along_x[n], along_y[n]) for n in (0, 1))
-        across = (along_x[0] * along_x[1] + along_y[0] * along_y[1]) / 12
-        return cls(x, y, width, height, across)
+    def around(cls, places: Sequence[Array], pitch: float) -> _Grid:
+        """Return the cells for squares about places [m]."""
+        low, high = min(float(p.min()) for p in places), max(float(p.max()) for p in places)
+        return cls(low - (BEYOND + FINER / 2) * pitch, pitch, math.ceil((high - low) / pitch) + 1)
 
     @property
-    def least(self) -> tuple[float, float]:
-        """Least width and height [m]."""
-        return float(self.width.min()), float(self.height.min())
+    def edges(self) -> Array:
+        """Edges of the cells, rising [m]."""
+        return self.first + self.pitch * np.arange(self.count + 2 * BEYOND + FINER)
 
-    @property
-    def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Left and upper, right and lower end of all of them [m]."""
-        half_x, half_y = self.width, self.height  # of pairs, more than enough
-        first = float((self.x - half_x).min()), float((self.y - half_y).min())
-        return first, (float((self.x + half_x).max()), float((self.y + half_y).max()))
-
-    @property
-    def halves(self) -> tuple[Array, Array, Array, Array]:
-        """Displacements of a pair from its center along x and y, its width and height [m].
-
-        The pair has the second moments of what its cell sees.
-        """
-        ratio = self.width / self.height
-        size = np.abs(self.across)
-        most = [MOST_APART * length**2 / 12 for length in (self.width, self.height)]
-        size = np.minimum(size, np.minimum(most[0] / ratio, most[1] * ratio))
-        dx = np.sqrt(size * ratio)
-        dy = np.copysign(np.sqrt(size / ratio), self.across)
-        width, height = (
-            np.sqrt(np.square(length) - 12 * np.square(apart))
-            for length, apart in ((self.width, dx), (self.height, dy))
-        )
-        return dx, dy, width, height
+    def index(self, place: Array) -> Array:
+        """Return where among the squares those about places lie."""
+        return (place - self.first) / self.pitch - FINER / 2
 
 
-def _box_means(planes: Array, edges: Sequence[Array], box: _Boxes) -> Array:
-    """Return the means (R, m, n) over boxes of planes (R, rows, columns) on cells between edges."""
-    from scipy.sparse import csr_array
-
-    x, y = edges
-    pitch = float(x[1] - x[0]), float(y[1] - y[0])
-    dx, dy, width, height = box.halves
-    weights, index = [], []
-    for sign in (-1, 1) if np.abs(dx).max() > ROUND * pitch[0] else (0,):
-        columns, across = _ends(box.x + sign * dx - x[0], width, pitch[0], len(x))
-        rows, down = _ends(box.y + sign * dy - y[0], height, pitch[1], len(y))
-        index.append((rows[:, :, None] * len(x) + columns[:, None, :]).reshape(len(rows), -1))
-        weights.append((down[:, :, None] * across[:, None, :]).reshape(len(rows), -1))
-    taps = np.concatenate(weights, axis=1) / len(weights)
-    starts = np.arange(len(taps) + 1, dtype=np.int32) * taps.shape[1]
-    at = np.concatenate(index, axis=1).reshape(-1)
-    means = csr_array((taps.reshape(-1), at, starts), (len(taps), len(x) * len(y)))
-    sums = np.zeros((len(y), len(x), len(planes)))
-    for number, plane in enumerate(planes):
-        sums[1:, 1:, number] = plane.cumsum(axis=0, dtype=float).cumsum(axis=1)
-    found = means @ sums.reshape(-1, len(planes))
-    return np.moveaxis(found.reshape(*box.x.shape, -1), -1, 0)
+def _halves(places: tuple[Array, Array], axis: int) -> list[tuple[Array, Array]]:
+    """Return both halves of columns and rows, across an axis."""
+    x, y = places
+    halves = np.array_split(places[axis], 2)
+    return [(x, half) if axis else (half, y) for half in halves]
 
 
-def _ends(place: Array, size: Array, pitch: float, count: int) -> tuple[Array, Array]:
-    """Return the sums that make means along an axis, their indices and weights (cells, 4).
-
-    Sums are straight between their places: the mean is what they grow by from one end of the box
-    to the other, over its width, counted in cells.
-    """
-    center, width = place.ravel() / pitch, size.ravel() / pitch
-    index = np.empty((len(center), 4), np.int32)
-    weights = np.empty((len(center), 4))
-    for side, sign in ((0, -1), (1, 1)):
-        end = center + sign / 2 * width
-        low = np.clip(end.astype(np.int32), 0, count - 2)
-        part = end - low
-        index[:, 2 * side], index[:, 2 * side + 1] = low, low + 1
-        weights[:, 2 * side], weights[:, 2 * side + 1] = (1 - part) * sign, part * sign
-    return index, weights / width[:, None]
+def _square_means(plane: Array) -> Array:
+    """Return the means over squares of `FINER` cells along each side, one at every cell."""
+    rows, columns = (count - FINER + 1 for count in plane.shape)
+    tall = np.sum([plane[k : k + rows] for k in range(FINER)], axis=0)
+    return np.asarray(np.sum([tall[:, k : k + columns] for k in range(FINER)], axis=0) / FINER**2)
