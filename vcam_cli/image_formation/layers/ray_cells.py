@@ -25,10 +25,6 @@ ENTRIES = 1024
 """Frequencies at which a round transfer function is tabulated."""
 POINTS = 4
 """Rays of a group for which what diffraction passes is computed, about."""
-RINGS, SECTORS = 4, 8
-"""Rings of equal area and sectors of the pupil, opposite ones together: groups of rays that
-diffraction treats alike."""
-
 
 @dataclass(frozen=True)
 class Window:
@@ -161,13 +157,22 @@ class SharpImage:
         self._transfer = Transfer(path.transfer.wavelengths, white, blurs)
         self._known: dict[tuple[int, tuple[int, int]], Array] = {}
 
-    def groups(self, rays: Array) -> list[Array]:
+    @property
+    def diffracts(self) -> bool:
+        """Whether the lens diffracts, so that few of the rays count at each frequency."""
+        return self._lens is not None
+
+    def groups(self, rays: Array, rings: int, sectors: int) -> list[Array]:
         """Return rays in groups; in a group about the same waves diffract.
 
         Parameters
         ----------
         rays : Array
             Rays (n, 5).
+        rings : int
+            Rings of equal area of the pupil.
+        sectors : int
+            Sectors of each; opposite ones are one.
 
         Returns
         -------
@@ -177,9 +182,9 @@ class SharpImage:
         if self._lens is None:
             return [rays]
         x, y = rays[:, 0], rays[:, 1]
-        ring = (RINGS * (x**2 + y**2)).astype(int)
-        sector = (SECTORS * (np.arctan2(y, x) / np.pi % 1)).astype(int) % SECTORS
-        number = ring * SECTORS + sector
+        ring = (rings * (x**2 + y**2)).astype(int)
+        sector = (sectors * (np.arctan2(y, x) / np.pi % 1)).astype(int) % sectors
+        number = ring * sectors + sector
         return [rays[number == own] for own in np.unique(number)]
 
     @property
