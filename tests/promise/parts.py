@@ -12,6 +12,7 @@ from typing import Any
 import chart_cameras
 import exact_errors
 import frames
+import layer_accuracies
 import periodic_cameras
 import promises
 import random_cameras
@@ -205,6 +206,12 @@ PARTS = {
         frames.cases(frames.COUNT, 0),
         frames.measure,
         frames.figures,
+    ),
+    "layers": Part(
+        "random layered frames at three accuracies: whether a tighter one errs less",
+        tuple((seed,) for seed in layer_accuracies.SEEDS),
+        layer_accuracies.measure,
+        layer_accuracies.figures,
     ),
     "matrix": Part(
         "ten cameras before eighteen scenes: what is left out, against true ablations",

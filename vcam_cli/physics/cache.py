@@ -61,8 +61,8 @@ class ByteCache(Generic[T]):
 
     def __init__(self, limit: int, strict: bool = False) -> None:
         self._limit, self._least = limit, 0 if strict else 1
-        self._kept: OrderedDict[Hashable, T] = OrderedDict()
-        self._sizes: dict[Hashable, int] = {}
+        self._kept: OrderedDict[Hashable, tuple[T, int]] = OrderedDict()
+        self._nbytes = 0
         self._lock = Lock()
 
     def __reduce__(self) -> tuple[type[ByteCache[T]], tuple[int, bool]]:
@@ -89,22 +89,23 @@ class ByteCache(Generic[T]):
         with self._lock:
             if key in self._kept:
                 self._kept.move_to_end(key)
-                return self._kept[key]
+                return self._kept[key][0]
         value = compute()
         with self._lock:
-            self._kept[key] = value
-            self._sizes[key] = value.nbytes
-            while len(self._kept) > self._least and self.nbytes > self._limit:
-                del self._sizes[self._kept.popitem(last=False)[0]]
+            self._nbytes -= self._kept.pop(key, (value, 0))[1]
+            self._kept[key] = value, value.nbytes
+            self._nbytes += value.nbytes
+            while len(self._kept) > self._least and self._nbytes > self._limit:
+                self._nbytes -= self._kept.popitem(last=False)[1][1]
         return value
 
     def clear(self) -> None:
         """Keep nothing."""
         with self._lock:
             self._kept.clear()
-            self._sizes.clear()
+            self._nbytes = 0
 
     @property
     def nbytes(self) -> int:
-        """Memory that the results take [bytes]."""
-        return sum(self._sizes.values())
+        """Memory that the results took when they were computed [bytes]."""
+        return self._nbytes

@@ -187,7 +187,9 @@ def edge_shares(discs: Discs, cells: CrossedCells, divided: int = MOST) -> EdgeS
             cells.front[pair],
         )
         cell, label, weight = _resolve(discs, parts, divided)
-    return EdgeShares(single, front, back, inside, cell, label, weight)
+    labels, cells_type = (np.min_scalar_type(count + 1) for count in (len(discs), len(single)))
+    front, back, label = (numbers.astype(labels) for numbers in (front, back, label))
+    return EdgeShares(single, front, back, inside, cell.astype(cells_type), label, weight)
 
 
 @dataclass(frozen=True)

@@ -225,7 +225,7 @@ def _painted(path: OpticalPath, scene: LayeredScene, cells: Cells) -> list[RayLa
         mix[:-1, :-1], mix[-1, -1] = level, 1
         if not _meets(part, *edges):
             continue
-        planes = part.chart.averages(*edges, mix)
+        planes = part.chart.crop_to_cells(*edges).averages(*edges, mix)
         if not planes[-1].any():
             continue
         path_x, path_y, place_x, place_y = 0.0, 0.0, 0.0, 0.0

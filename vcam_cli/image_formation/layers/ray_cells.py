@@ -26,6 +26,7 @@ ENTRIES = 1024
 POINTS = 4
 """Rays of a group for which what diffraction passes is computed, about."""
 
+
 @dataclass(frozen=True)
 class Window:
     """Rows and columns of pixels."""

@@ -20,7 +20,7 @@ References
 
 import math
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -220,6 +220,25 @@ class PlacedLeaves(Chart):
 
 
 @dataclass(frozen=True)
+class CoveredCells:
+    """Leaves that some cells see, and which of them is seen where."""
+
+    leaves: Leaves
+    coverage: discs.Coverage
+
+    @property
+    def nbytes(self) -> int:
+        """Memory [bytes]."""
+        return self.coverage.nbytes + 5 * self.leaves.factor.nbytes
+
+    def averages(self, mix: Array) -> Array:
+        """Return the averages (R, rows, columns) over the cells in the colors of `mix` (R, 12)."""
+        out = np.empty((len(mix), *self.coverage.label.shape), mix.dtype)
+        self.coverage.paint(self.leaves.color(mix).astype(mix.dtype, copy=False), out)
+        return out
+
+
+@dataclass(frozen=True)
 class DeadLeaves(Chart):
     """The chart: leaves that repeat with `PERIOD`."""
 
@@ -330,8 +349,19 @@ class DeadLeaves(Chart):
         for top in range(0, rows, band):
             cells = out[:, top : top + band]
             y = _divided(y_edges[top : top + band + 1], parts)
-            fine = each.crop_to_cells(x, y).averages(x, y, mix)
-            cells[:] = cell_means(fine, parts)
+            make = partial(each._covered, x, y)
+            if self.keep:
+                make = partial(discs.kept, (x, y), (self.seed, self.unit, each.divided), make)
+            cells[:] = cell_means(make().averages(mix), parts)
+
+    def _covered(self, x_edges: Array, y_edges: Array) -> "CoveredCells":
+        """Return which leaves are seen where on undivided cells."""
+        laid = self.crop_to_cells(x_edges, y_edges)
+        assert isinstance(laid, PlacedLeaves)
+        x, y = x_edges / self.unit, y_edges / self.unit
+        found = discs.coverage(laid.leaves.discs, x, y, None, self.divided)
+        near = replace(found, near=np.arange(len(found.near)))
+        return CoveredCells(laid.leaves.select(found.near), near)
 
     def _placed_leaves(self, x: Array, y: Array) -> PlacedLeaves:
         left, right, top, bottom = (end / self.unit for end in (x[0], x[-1], y[0], y[-1]))
