@@ -1,7 +1,7 @@
 """The promises of the plan, measured: prints every figure, and exits with 1 where one is missed.
 
-    python -m tests.promise [--named] [--random] [--exact] [--frames] [--layers] [--matrix] [--times]
-                            [--spent] [--count N] [--first-seed N] [CAMERA...]
+    python -m tests.promise [--named] [--random] [--exact] [--frames] [--layers] [--matrix]
+                            [--times] [--spent] [--count N] [--first-seed N] [CAMERA...]
     python -m tests.promise --frames --kinds KIND... [--count N] [--first-seed N]
     python -m tests.promise --only KIND SEED
 

@@ -2,7 +2,7 @@
 
     python -m tests.promise --layers
 
-Truths are those of `frame_rays.py`, with up to four times as many rays as other frames need; those
+Truths are those of `frame_rays.py`, with up to twice as many rays as other frames need; those
 with diffraction are the same.
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from unittest.mock import patch
 
@@ -23,7 +24,7 @@ from vcam_cli import simulate
 ACCURACIES = {"2 %": 0.02, "0.5 %": 0.005, "0.1 %": 0.001}
 """From loose to tight."""
 SEEDS = range(60100, 60120)
-TRUTH = {"GOAL": 2e-5, "RAYS": 38400}
+TRUTH = {"GOAL": 5e-5, "RAYS": 19200}
 """What may be left of the truth's error, of full signal, and points of the pupil at most."""
 COUNTED = 0.05
 """Errors below this part of the tolerance, or below the truth's own, say nothing of predictions."""
@@ -37,6 +38,7 @@ class Converged:
     measured: dict[str, float]
     """Rms error, of full signal."""
     predicted: dict[str, float]
+    """The same; nothing where no layer that is seen hides another."""
     unsure: float
     """What is left of the truth's error, of full signal."""
 
@@ -44,18 +46,17 @@ class Converged:
     def line(self) -> str:
         """What is printed of it."""
         each = "  ".join(
-            f"{name}: {self.measured[name]:.2e} ({self.predicted[name]:.2e} predicted)"
-            for name in ACCURACIES
+            f"{name}: {found:.2e} ({self.predicted.get(name, 0.0):.2e} predicted)"
+            for name, found in self.measured.items()
         )
         return f"{self.seed}  {each}  truth {self.unsure:.0e}"
 
     @property
     def excess(self) -> float:
         """By how much a tighter accuracy errs more than a looser one, largest, of the tighter T."""
-        names = list(ACCURACIES)
         return max(
             (self.measured[tight] - self.measured[loose] - self.unsure) / ACCURACIES[tight]
-            for loose, tight in zip(names, names[1:], strict=False)
+            for loose, tight in pairwise(ACCURACIES)
         )
 
     @property
@@ -64,7 +65,7 @@ class Converged:
         return [
             self.predicted[name] / found
             for name, found in self.measured.items()
-            if found > max(COUNTED * ACCURACIES[name], 2 * self.unsure)
+            if name in self.predicted and found > max(COUNTED * ACCURACIES[name], 2 * self.unsure)
         ]
 
 
@@ -76,10 +77,9 @@ def measure(seed: int, folder: Path) -> Converged:
     measured, predicted = {}, {}
     for name in ACCURACIES:
         result = simulate(frame.load(folder, name, "auto"), workers=1)
-        depth = result.frame.spectrum.depth
-        assert depth is not None
         measured[name] = error(result.mean_electrons, true)
-        predicted[name] = depth.error
+        if depth := result.frame.spectrum.depth:
+            predicted[name] = depth.error
     return Converged(seed, measured, predicted, true.error)
 
 
