@@ -234,8 +234,8 @@ def _squares(one: _Sum, other: _Sum) -> float:
 def _too_coarse(sums: Sequence[_Sum], budget: float, levels: int) -> list[_Sum]:
     """Return the windows to be refined for all errors together to come within a budget.
 
-    They are those that err most for what they cost, of those before the last of so many levels, and
-    enough of them to keep the budget if the squares of their errors shrink as expected.
+    They are those before the last of `levels` that err most for what they cost, and enough of them
+    to keep the budget if the squares of their errors shrink as expected.
     """
     total = sum(one.error for one in sums)
     if total <= budget:
