@@ -280,6 +280,8 @@ class WarpedChart(Chart):
 
     def _tile(self, places: tuple[Array, Array], size: tuple[float, float], mix: Array) -> Array:
         """Return the averages (R, m, n) over cells about columns and rows of places."""
+        from scipy import ndimage
+
         centers = self.sees.on_grid(*places)
         side, ways = self._squares(places, size)
         grids = [
