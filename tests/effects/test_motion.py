@@ -7,7 +7,7 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 import yaml
-from making import QUIET, camera, radiance_for, tree
+from making import GONE, QUIET, camera, radiance_for, tree
 
 from vcam_cli import load, simulate
 from vcam_cli.camera.derived.geometry import geometry
@@ -194,3 +194,21 @@ def test_a_scene_may_overtake_the_shutter(tmp_path):
 def test_layers_may_overtake_the_shutter():
     sets = ["scene.source.motion.y=1000 km/s", "array.rows=12", "array.columns=16"]
     assert np.isfinite(simulate(load("street", sets)).mean_electrons).all()
+
+
+@pytest.mark.parametrize("chart", ["sinusoid", "slanted-edge", "step-wedge"])
+def test_rows_are_read_by_number_wherever_photodetectors_are(chart, tmp_path):
+    """Before a scene that is even along columns, photodetectors in any height see the same.
+
+    A wave, an edge that has a closed form, and a chart that is sampled.
+    """
+    keys = {"sinusoid": {"frequency": "40 lp/mm"}, "slanted-edge": {"angle": "0 deg"}}
+    source = {"kind": "chart", "chart": chart, "motion": motion((6.0, 0.0)), **keys.get(chart, {})}
+    found = []
+    for top in (1.5, 2.5):
+        place = {"width": "2 um", "height": "2 um", "x": "1.5 um", "y": f"{top} um"}
+        place |= {"fill_factor": GONE}
+        detector = {f"pixel.photodetector.{name}": value for name, value in place.items()}
+        found.append(mean(tmp_path, {"scene.source": source}, ROLLING, detector))
+    assert np.ptp(found[0]) > 0.1 * found[0].max()
+    assert found[1] == pytest.approx(found[0], rel=1e-6)

@@ -5,12 +5,19 @@ import pytest
 
 
 @pytest.mark.parametrize(
-    "name",
+    ("kind", "name"),
     [
-        "a lit sample cut off above black",  # 14 T at draft: its tail was cut off with it
-        "a star of three spokes, 8 x 8",  # 2.2 T at reference: one edge lies along the columns
+        (
+            "named",
+            "a lit sample cut off above black",
+        ),  # 14 T at draft: its tail was cut off with it
+        ("named", "a star of three spokes, 8 x 8"),  # 2.2 T: an edge lies along the columns
+        ("array", "80268"),  # 2.4 T: rows were read by where their photodetectors are
+        ("array", "80184"),  # 1.4 times the variance: levels of pixels, not of joined ones
+        ("field", "80012"),  # 1.2 T: few places on a stretch of the field
+        ("lone", "80400"),  # 1.1 T: one pixel may lose more than all places do on average
     ],
 )
-def test_a_frame_keeps_every_tolerance(name, tmp_path):
-    found = frames.measure("named", name, tmp_path)
+def test_a_frame_keeps_every_tolerance(kind, name, tmp_path):
+    found = frames.measure(kind, name, tmp_path)
     assert not found.misses, found.text

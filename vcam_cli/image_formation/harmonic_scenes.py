@@ -54,13 +54,17 @@ def wave_layers(path: OpticalPath, scene: WaveScene) -> tuple[Layers, SpectrumRe
     """
     x, y = pixel_centers(path.geometry, detector=True)
     (drift_x, drift_y), (moved_x, moved_y) = path.drift, path.displacement
-    shapes = [
-        (
-            np.exp(1j * (2 * np.pi * (w.fx * (x - moved_x) - w.fy * moved_y) + w.phase)),
-            np.exp(2j * np.pi * (w.fy * (1 - drift_y) - w.fx * drift_x) * y),
+    first = path.geometry.collecting_y  # rows are read one after the other, not photodetectors
+
+    def shape(w: Wave) -> tuple[Array, Array]:
+        skew = w.fy * drift_y + w.fx * drift_x
+        turns = w.fx * (x - moved_x) - w.fy * moved_y + skew * first
+        return (
+            np.exp(1j * (2 * np.pi * turns + w.phase)),
+            np.exp(2j * np.pi * (w.fy - skew) * y),
         )
-        for w in scene.waves
-    ]
+
+    shapes = [shape(w) for w in scene.waves]
 
     def layer(levels: Array, weight: Weight) -> Layer:
         def values(color: int, s: slice) -> Array:

@@ -263,10 +263,11 @@ class EdgeImage:
         x, y = pixel_centers(self.path.geometry, detector=True)
         (drift_x, drift_y), (moved_x, moved_y) = self.path.drift, self.path.displacement
         across_x, across_y = self.profile.across
-        down = across_y * (1 - drift_y) - across_x * drift_x
-        length = math.hypot(self.path.geometry.sensor_width, self.path.geometry.sensor_height)
-        differ = abs(down) * length > 1e-9 * self.path.geometry.pitch_y
-        along = across_x * (x - moved_x) - across_y * moved_y
+        g, skew = self.path.geometry, across_y * drift_y + across_x * drift_x
+        down = across_y - skew
+        differ = abs(down) * math.hypot(g.sensor_width, g.sensor_height) > 1e-9 * g.pitch_y
+        # Rows are read one after the other, wherever in its pixel a photodetector is.
+        along = across_x * (x - moved_x) - across_y * moved_y + skew * g.collecting_y
         return along, down * y if differ else np.zeros(len(y)), differ
 
     def changes(self) -> dict[str, float]:

@@ -288,7 +288,8 @@ def axes(path: OpticalPath, scene: SampledScene, highest: float) -> tuple[Axis, 
         moved: float,
         seen: float = 1.0,
     ) -> Axis:
-        first = samples * pitch / 2 + seen * ((0.5 - pixels / 2) * pixel + shift) - moved
+        # Rows are read one after the other, wherever in its pixel a photodetector is.
+        first = samples * pitch / 2 + seen * (0.5 - pixels / 2) * pixel + shift - moved
         bandwidth = min(highest * 0.5 / pixel, cutoff)
         return _axis(samples, pitch, pixels, seen * pixel, first, squares, bandwidth)
 
@@ -296,8 +297,8 @@ def axes(path: OpticalPath, scene: SampledScene, highest: float) -> tuple[Axis, 
     x = axis(nx, scene.pitch_x, g.columns, pitch_x, g.collecting_x, moved_x)
     y = axis(ny, scene.pitch_y, g.rows, pitch_y, g.collecting_y, moved_y, 1 - drift_y)
     if drift_x:
-        _, rows = pixel_centers(g, detector=True)
-        x = replace(x, row_shifts=-drift_x * rows)
+        _, rows = pixel_centers(g)
+        x = replace(x, row_shifts=-drift_x * g.sampling_scale * rows)
     return x, y
 
 
