@@ -73,7 +73,7 @@ RAY = 12e-9
 LOOK_UP = 3e-9
 """One value of a layer that a ray looks up, painted and composed [s]."""
 
-WARPED = 0.35e-6
+WARPED = 0.18e-6
 """One cell of one plane of a chart looked up where a warp sees it, painted and averaged [s]."""
 
 DIRECTED = 4
