@@ -78,7 +78,8 @@ def truth(name: str, focal: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("name", "tolerance"), [("barrel", 5e-3), ("fisheye", 5e-3), ("barrel", 5e-4)]
+    ("name", "tolerance"),
+    [("barrel", 5e-3), ("fisheye", 5e-3), pytest.param("barrel", 5e-4, marks=pytest.mark.long)],
 )
 def test_spokes_through_a_lens_keep_the_tolerance(name, tolerance, tmp_path):
     """With a tight tolerance far light counts, which rings of cells around the array hold."""

@@ -72,7 +72,7 @@ class Moments(NamedTuple):
         return middle - apart, middle + apart
 
     def beyond(self, square: float) -> Moments:
-        """Return what is left of them without a square's."""
+        """Return their excess over those of a square."""
         return Moments(self.xx - square, self.yy - square, self.xy)
 
     @property
