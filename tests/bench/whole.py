@@ -78,6 +78,7 @@ QUICK = Size(
     varied=("exposure time",),
     layers=(216, 288),
     shipped=("starter", "csf-monochrome", "eye-chart"),
+    cheap=((5792, 8688), 100_000, 4),
 )
 
 
