@@ -89,7 +89,7 @@ class OpticalPath:
     """Where sampled scenes are transformed, filtered and evaluated at the pixels."""
     is_explained: bool = True
     """Whether the report says what each transfer function changes: 3 % of a frame of 64 x 64
-    pixels of a data set, which asks for no plan."""
+    pixels of a data set, which needs no plan."""
 
     def with_effects(self, kept: Sequence[Effect]) -> OpticalPath:
         """Return the path with some of its effects alone.

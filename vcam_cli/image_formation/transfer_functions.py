@@ -48,7 +48,7 @@ class Band:
 
 
 _RESPONSES: ByteCache[Array] = ByteCache(1 << 22, strict=True)
-"""Responses of the last lenses, by all that they depend on: pictures before one lens ask for the
+"""Responses of the last lenses, by all that they depend on: pictures before one lens need the
 same again, 5 % of a frame of 64 x 64 pixels."""
 
 
@@ -74,7 +74,7 @@ class Transfer:
 
     @cached_property
     def key(self) -> Hashable | None:
-        """All that it is, where that can be told by values."""
+        """All that it consists of; None where an effect has no hash."""
         key = self.wavelengths.tobytes(), self.weights.tobytes(), self.weights.shape, self.effects
         try:
             hash(key)
