@@ -234,7 +234,9 @@ def _spectral_layers(
     memory.require(needed(least), g.rows, g.columns)
     image = sampled_image(path, scene, highest, mixing, least)
     size = table_size(path, image.highest)
-    total = needed(image.highest) + memory_model.table_bytes(path, len(mixing[0]), size)
+    # A layer's image is held beside those of others, counted by the highest frequency.
+    filtered = highest if path.has_opacity else image.highest
+    total = needed(filtered) + memory_model.table_bytes(path, len(mixing[0]), size)
     memory.require(total, g.rows, g.columns)
     modes: tuple[Mode, ...] = ()
     if field_rings:
