@@ -62,7 +62,7 @@ class LightDisc:
         return inside and abs(self.y) + self.radius <= height / 2
 
     def touches(self, width: float, height: float) -> bool:
-        """Return whether some of it lies in a centered rectangle; it may say so of a near one.
+        """Return whether some of it may lie in a centered rectangle: its square touches that.
 
         Parameters
         ----------

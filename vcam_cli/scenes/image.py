@@ -166,7 +166,7 @@ class ImageScene(SampledScene):
 
     @cached_property
     def brightest_cut(self) -> float:
-        """Largest sample beyond array and margin, in units of white; 0 where there is none."""
+        """Largest sample beyond array and margin, in units of white; 0 if nothing is cut."""
         return max(map(self._largest, self.cut), default=0.0)
 
     def _largest(self, samples: Array) -> float:
