@@ -63,7 +63,8 @@ def photodetector(draw: Draw, width: float, fill: float) -> Changes:
         return {"pixel.photodetector.fill_factor": fill}
     wide = fill ** draw.even(0.35, 0.65)
     sides = width * wide, width * fill / wide
-    corner = (draw.even(0, 1) * (width - side) for side in sides)
+    # As many digits as are written of it may be more than there is room for.
+    corner = (draw.even(0, 1 - 1e-4) * (width - side) for side in sides)
     named = zip(("width", "height", "x", "y"), (*sides, *corner), strict=True)
     own = {f"pixel.photodetector.{name}": f"{value * 1e6:.6g} um" for name, value in named}
     return {"pixel.photodetector.fill_factor": GONE, **own}
