@@ -95,7 +95,7 @@ def of_picture(picture: Any, pitch: float, dtype: type = np.float64) -> ImageSce
     samples = np.atleast_3d(np.asarray(picture, dtype))
     return ImageScene(
         spectra=(WHITE,) * samples.shape[2], white=WHITE, shape=samples.shape[:2], pitch_x=pitch,
-        pitch_y=pitch, samples="squares", dtype=dtype, picture=samples, black=(0, 0),
+        pitch_y=pitch, samples="squares", dtype=dtype, picture=samples, black=(0, 0), cut=(),
         seen=(1.0, 1.0),
     )  # fmt: skip
 

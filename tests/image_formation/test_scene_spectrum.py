@@ -319,7 +319,7 @@ def rate(folder, source, **accuracy):
 def test_finer_and_finer_cells_come_to_it(source, tmp_path, monkeypatch):
     """More or less quickly, as the edges happen to lie within the cells."""
     exact = rate(tmp_path, source, oversampling=64)
-    assert exact.spectrum.lost_rms == 0
+    assert exact.spectrum.lost_rms < 1e-5 * exact.rate.max()  # rounding of 32 bits
     assert exact.spectrum.cells == 0
     monkeypatch.setattr("vcam_cli.scenes.base.ChartScene.rectangles", lambda *_: None)
     for kind in (ColorChecker, type(step_wedge(2, 1.0, Frame(1.0, 1.0)))):

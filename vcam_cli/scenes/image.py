@@ -313,8 +313,8 @@ def image_scene(
         pitch_y = _visible_pitch(pitch_y, shape[0], height)
     bottom, right = rows - top, columns - left
     beside = (
-        picture[:top],
-        picture[bottom:],
+        picture[:top, :],
+        picture[bottom:, :],
         picture[top:bottom, :left],
         picture[top:bottom, right:],
     )

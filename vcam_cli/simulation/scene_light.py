@@ -42,7 +42,7 @@ from vcam_cli.solve.solved import Solved
 
 ASSUMED = 0.9
 """Full signal over the scene's brightest light, as assumed before there is any signal."""
-DARKER = 2.0
+DARKER = 4.0
 """Full signal that a margin was made for over that of the array, above which it is widened: it errs
 by no more than this times its share of the tolerance, `bandwidth.MARGIN_SHARE`."""
 OVERFULL = 2.0
