@@ -95,6 +95,7 @@ WITHIN = {"a lens that distorts": 5e-4}
 shares of the tolerance by themselves."""
 
 
+@pytest.mark.long
 def test_charts_read_back_make_the_same_frame(tmp_path):
     """Every chart before the starter, and one chart before every camera."""
     runs = [(chart, "a sharp lens") for chart in CHARTS]
