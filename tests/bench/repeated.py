@@ -17,6 +17,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
+import yaml
 
 from vcam_cli import load, simulate, sweep
 from vcam_cli.camera.camera import Camera
@@ -175,18 +176,29 @@ def _forecasts() -> dict[str, Row]:
             "a cube of 31 bands, EXR": f"{{kind: hyperspectral, file: {folder}/cube.exr}}",
         }
         size = f"array.rows={rows}", f"array.columns={columns}", "quality=[]"
+        wavelengths = "scene.wavelengths={start: 400 nm, stop: 700 nm}"
         found = {}
         for what, source in sources.items():
-            own = ("scene={distance: 1 m}", "scene.wavelengths={start: 400 nm, stop: 700 nm}")
-            sets = (*size, *(own if "cube" in what else ()), f"scene.source={source}")
-            found[what] = {"ratio": forecast_ratio(sets, folder / "out")}
+            camera, sets = "starter", (*size, f"scene.source={source}")
+            if "cube" in what:  # it has light of its own
+                camera = str(_without_lamp(folder / "camera.yaml"))
+                sets = (*sets, wavelengths, "scene.luminance=100 cd/m2")
+            found[what] = {"ratio": forecast_ratio(camera, sets, folder / "out")}
     return found
 
 
-def forecast_ratio(sets: Sequence[str], out: Path) -> float:
-    """Forecast of memory over the peak of a process that runs the starter camera."""
+def _without_lamp(file: Path) -> Path:
+    command = [sys.executable, "-m", "vcam_cli.commands.main", "list", "cameras", "starter"]
+    tree = yaml.safe_load(subprocess.run(command, check=True, capture_output=True).stdout)
+    del tree["scene"]["illuminant"]
+    file.write_text(yaml.safe_dump(tree))
+    return file
+
+
+def forecast_ratio(camera: str, sets: Sequence[str], out: Path) -> float:
+    """Forecast of memory over the peak of a process that runs a camera."""
     options = [word for each in sets for word in ("--set", each)]
-    command = [sys.executable, "-m", "vcam_cli.commands.main", "run", "starter", "-o", str(out)]
+    command = [sys.executable, "-m", "vcam_cli.commands.main", "run", camera, "-o", str(out)]
     subprocess.run([*command, "-q", *options], check=True, stdout=subprocess.DEVNULL)
     record = json.loads((out / "run.json").read_text())
     return record["plan"]["memory_bytes"] / record["peak_memory_bytes"]

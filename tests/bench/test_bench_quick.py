@@ -44,7 +44,7 @@ def found():
         patch.setattr(sections, "_swept", lambda study, out, points: 1.0)
         patch.setattr(sections, "start_cost", lambda work, folder: Cost(len(work), len(work)))
         patch.setattr(repeated, "start_cost", lambda work, folder: Cost(len(work), len(work)))
-        patch.setattr(repeated, "forecast_ratio", lambda sets, out: 1.1)
+        patch.setattr(repeated, "forecast_ratio", lambda camera, sets, out: 1.1)
         patch.setattr(repeated, "scheduler_growth", lambda points: 1.0)
         patch.setattr(cheap, "start_cost", lambda work, folder: Cost(len(work), len(work)))
         patch.setattr(cheap, "peak_memory", lambda *_, work: 200_000_000)

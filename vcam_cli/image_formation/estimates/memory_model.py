@@ -26,7 +26,7 @@ from vcam_cli.physics.pupil_harmonics import MOST
 from vcam_cli.scenes.bands import bands_of_rows
 from vcam_cli.scenes.base import ChartScene, SampledScene
 
-BASE = 170_000_000
+BASE = 180_000_000
 """Interpreter and libraries of `vcam run`; a call of the library takes 40 MB less [bytes]."""
 JUDGED = 22
 """What comparing an image with the ideal one takes for each color of a pixel [bytes]."""
