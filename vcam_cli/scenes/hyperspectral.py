@@ -51,9 +51,8 @@ Bands are painted in units of white, and none in units of 0.
 """
 ROWS = 64
 """Rows that are read at once."""
-STRIPS = 1.6
-"""Memory of reading strips over that of the largest: 1.3 to 1.55 measured of EXR, one or two
-processes at a time."""
+READER = 25_000_000
+"""Memory of a file's reader beside the strip that it returns [bytes]."""
 FEW_POINTS = 8
 """Samples per point above which the bands of the points alone are read, and not the cube."""
 
@@ -91,10 +90,10 @@ class StoredSamples:
 
     @property
     def nbytes(self) -> int:
-        """Memory of the strips that are read at once [bytes]."""
+        """Memory of reading the largest strip [bytes]."""
         rows, columns, bands = self.shape
         strip = bands_of_rows(rows, columns)[0].stop
-        return int(STRIPS * strip * columns * bands * self.dtype.itemsize)
+        return READER + int(strip * columns * bands * self.dtype.itemsize)
 
     def __len__(self) -> int:
         return self.shape[0]

@@ -55,7 +55,7 @@ class SpectralData:
     white: np.ndarray | None = None
     """The radiance (bands,) of a perfect white [W/(sr m2 m)], where the file holds it."""
     notes: tuple[str, ...] = ()
-    copies: int = 0
+    copies: float = 0
     """How many times `read` holds the values, as float32, beside those that it returns."""
     read_rows: Callable[[int, int], np.ndarray] | None = None
     """Returns the values (n, w, bands) of the rows from one to another, where they can be read by

@@ -114,7 +114,7 @@ def read_cube(
         data, notes = _si_samples(stored, order, samples)
         beside = 0
         if stored.read_rows is None:
-            beside = stored.copies * data.nbytes + samples.beside
+            beside = round(stored.copies * data.nbytes) + samples.beside
         return Cube(data, _bands(stored, order), beside), (*stored.notes, *notes)
 
 
