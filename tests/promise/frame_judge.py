@@ -72,6 +72,9 @@ def judge(
     """Judge one frame; files are written into a folder. tolerances: accuracy -> T."""
     camera = frame.load(folder, "draft", "all")
     true = frame_truth.truth(frame, camera)
+    # Variances are stated at the mean of pixels that are read as one; codes are their sum.
+    binning = camera.array.binning
+    summed = binning.count if binning is not None and binning.kind == "digital" else 1
     mean, variance, predicted, said = {}, {}, {}, ""
     try:
         all_on = prepare(camera, 1)[0]
@@ -85,7 +88,7 @@ def judge(
             mean[accuracy] = max(0.0, off - true.error) / tolerance
             if (told := _predicted(result.frame.spectrum)) is not None:
                 predicted[accuracy] = told / tolerance
-            lost = promises.variance_lost_of(result.frame, all_on, levels(true))
+            lost = promises.variance_lost_of(result.frame, all_on, levels(true) / summed)
             variance[accuracy] = lost / (2 * tolerance)
         except Exception:
             said = said or _last_line()
