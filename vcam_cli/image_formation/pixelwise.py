@@ -171,9 +171,8 @@ def _means(values: Array, colors: Sequence[Array]) -> Array:
 
 def _colors(mosaic: Mosaic, rows: Array, columns: Array) -> list[Array]:
     """Return masks (rows, columns) of the pixels of each color."""
-    block = np.array(mosaic.block)
-    names = block[np.ix_(rows % block.shape[0], columns % block.shape[1])]
-    return [names == color for color in mosaic.colors]
+    index = mosaic.color_at(rows, columns)
+    return [index == number for number in range(len(mosaic.colors))]
 
 
 def _factors(gain: Gain, x: Array, y: Array, colors: Mapping[str, Array]) -> Array:

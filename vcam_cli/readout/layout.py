@@ -176,10 +176,8 @@ class Layout:
         """
         if self.is_scattered:
             return self.color[rows, columns]
-        mosaic, count = self.raw_mosaic, self.geometry
-        block = np.array([[mosaic.colors.index(c) for c in line] for line in mosaic.block])
-        down, along = np.arange(count.rows)[rows], np.arange(count.columns)[columns]
-        return block[np.ix_(down % block.shape[0], along % block.shape[1])]
+        g = self.geometry
+        return self.raw_mosaic.color_at(np.arange(g.rows)[rows], np.arange(g.columns)[columns])
 
     @property
     def picture_shape(self) -> tuple[int, int]:

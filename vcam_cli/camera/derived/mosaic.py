@@ -6,6 +6,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
+from vcam_cli.arrays import Array
 from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.sensor.array import Block
 
@@ -43,6 +46,13 @@ class Mosaic:
         for color in dict.fromkeys(name for name in line if name != NONE):
             at = [offset for offset, name in enumerate(line) if name == color]
             yield self.colors.index(color), [slice(offset, None, len(line)) for offset in at]
+
+    def color_at(self, rows: Array, columns: Array) -> Array:
+        """Return the indices (m, n) of the colors at rows (m,) and columns (n,); -1: no pixel."""
+        index = {name: number for number, name in enumerate(self.colors)}
+        block = np.array([[index.get(name, -1) for name in line] for line in self.block])
+        found: Array = block[np.ix_(rows % block.shape[0], columns % block.shape[1])]
+        return found
 
 
 def channel_order(colors: Iterable[str]) -> tuple[str, ...]:
