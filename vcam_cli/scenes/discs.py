@@ -115,14 +115,14 @@ def paint(
     make = partial(coverage, discs, x_edges, y_edges, hidden, divided)
     if keep:
         arrays = (discs.x, discs.y, discs.radius, x_edges, y_edges)
-        make = partial(kept, arrays, (str(hidden), divided), make)
+        make = partial(painted_once, arrays, (str(hidden), divided), make)
     make().paint(color, out)
 
 
 P = TypeVar("P", bound=Painted)
 
 
-def kept(arrays: Sequence[Array], more: Hashable, make: Callable[[], P]) -> P:
+def painted_once(arrays: Sequence[Array], more: Hashable, make: Callable[[], P]) -> P:
     """Return what was painted, of the same kind as before for the same arrays.
 
     Parameters

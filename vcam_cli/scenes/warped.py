@@ -71,7 +71,7 @@ class Moments(NamedTuple):
         apart = np.hypot((self.xx - self.yy) / 2, self.xy)
         return middle - apart, middle + apart
 
-    def beyond(self, square: float) -> Moments:
+    def excess_over(self, square: float) -> Moments:
         """Return their excess over those of a square."""
         return Moments(self.xx - square, self.yy - square, self.xy)
 
@@ -324,7 +324,7 @@ class WarpedChart(Chart):
             return math.sqrt((low + high) / 2), [(np.zeros(1), np.zeros(1))]
         moments = self.sees.seen_moments(x, y, size)
         low = float(moments.ends[0].min())
-        root = moments.beyond(low).root
+        root = moments.excess_over(low).root
         width, height = (length / math.sqrt(12) for length in size)
         return math.sqrt(low), [
             (width * (a * root.xx + b * root.xy), height * (a * root.xy + b * root.yy))

@@ -112,10 +112,10 @@ def read_cube(
     with _open_bands(Path(path), yaml_path, names) as (stored, order):
         samples = _place(stored, order)
         data, notes = _si_samples(stored, order, samples)
-        beside = 0
+        extra = 0
         if stored.read_rows is None:
-            beside = round(stored.copies * data.nbytes) + samples.beside
-        return Cube(data, _bands(stored, order), beside), (*stored.notes, *notes)
+            extra = round(stored.copies * data.nbytes) + samples.extra_bytes
+        return Cube(data, _bands(stored, order), extra), (*stored.notes, *notes)
 
 
 def companions(path: Path | str) -> tuple[Path, ...]:
@@ -266,7 +266,7 @@ class _Place:
     """Where those in SI units go: the same memory where they fit in."""
 
     @property
-    def beside(self) -> int:
+    def extra_bytes(self) -> int:
         """Memory of the values as the file has them, where it is not that of the others [bytes]."""
         return 0 if self.stored is self.si else self.stored.nbytes
 

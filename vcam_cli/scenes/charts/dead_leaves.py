@@ -351,7 +351,9 @@ class DeadLeaves(Chart):
             y = _divided(y_edges[top : top + band + 1], parts)
             make = partial(each._covered, x, y)
             if self.keep:
-                make = partial(discs.kept, (x, y), (self.seed, self.unit, each.divided), make)
+                make = partial(
+                    discs.painted_once, (x, y), (self.seed, self.unit, each.divided), make
+                )
             cells[:] = cell_means(make().averages(mix), parts)
 
     def _covered(self, x_edges: Array, y_edges: Array) -> "CoveredCells":
