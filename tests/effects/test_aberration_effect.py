@@ -12,7 +12,8 @@ import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
-from making import QUIET, camera, tree
+from making import QUIET, camera, radiance_for, tree
+from scipy.special import sici
 
 from vcam_cli import simulate
 from vcam_cli.camera.derived.geometry import geometry
@@ -24,6 +25,7 @@ from vcam_cli.effects.optics.field_blur import TYPICAL_CHANGE, FieldBlur, ZoneWe
 from vcam_cli.effects.optics.point_spread import PointSpread
 from vcam_cli.effects.optics.wavefront_blur import DirectedBlur, Lens, SymmetricBlur
 from vcam_cli.errors import BadInput
+from vcam_cli.floats import rms
 from vcam_cli.physics import zernike
 from vcam_cli.simulation.checks import load, read_lens
 
@@ -279,6 +281,28 @@ def test_nothing_beyond_the_nyquist_frequency_of_the_file(tmp_path):
     assert not found[:, 2:].any()
     assert found[0, 0] == pytest.approx(1, rel=1e-12)
     assert blur.cutoff(GREEN) == pytest.approx(math.sqrt(2) * 0.25e6)
+    assert blur.axis_cutoff(GREEN) == pytest.approx(0.25e6)
+
+
+@pytest.mark.parametrize("sigma", [0.3, 2])
+def test_the_tail_of_samples_rings_at_their_nyquist_frequency(sigma, tmp_path):
+    """Beyond u, a line leaves (1/2 - Si(2 pi F (u - x)) / pi) of every sample's light at x.
+
+    As much as the transfer still is at F rings on: 1 / (2 pi^2 F u) of it.
+    """
+    planes = gaussian(sigma, right=1.3)
+    blur, pitch = psf_of(tmp_path, planes), 1e-6
+    distance = np.geomspace(1e-7, 1e-2, 400)
+    found = blur.line_tail(distance)
+    u = (blur.reach + distance) / pitch
+    x, shares = np.arange(-20, 21), planes.sum(axis=0) / planes.sum()
+    for side in (1, -1):
+        beyond = (0.5 - sici(np.pi * np.subtract.outer(u, side * x))[0] / np.pi) @ shares
+        assert (abs(beyond) <= found + 1e-7).all()  # samples in 32 bits
+    f = np.array([0, 0.5 / pitch])
+    left = max(abs(blur.smooth_otf_plane(f, f, GREEN)[[0, 1], [1, 0]]))
+    far = u > 200
+    np.testing.assert_allclose(found[far], left / (np.pi**2 * u[far]), rtol=0.02, atol=1e-7)
 
 
 def test_channels_are_straight_in_between_and_held_outside(tmp_path):
@@ -342,6 +366,39 @@ def test_a_spread_from_a_file_runs(tmp_path):
     mean = mean_of(tmp_path, **{"scene.source": WAVE | {"contrast": 0}})
     # samples in 32 bits
     np.testing.assert_allclose(soft - mean, factor * (sharp - mean), atol=1e-6 * mean.max())
+
+
+@pytest.mark.parametrize("accuracy", ["standard", "reference"])
+def test_edges_ring_behind_coarse_samples(accuracy, tmp_path):
+    """Samples that end at their Nyquist frequency F make of an edge 1/2 + Si(2 pi F u) / pi.
+
+    A pixel of the width w sees the mean of that; Si has the integral z Si(z) + cos z.
+    """
+    planes, pitch, width = gaussian(0.5, 3), 4e-6, 5e-6
+    psf = {"file": spread(tmp_path / "p.exr", planes), "pitch": f"{pitch * 1e6} um"}
+    wedge = {"kind": "chart", "chart": "step-wedge", "steps": 4, "density_range": 2}
+    size = {"array.rows": 2, "array.columns": 6, "scene.radiance": radiance_for(5e4)}
+    found = mean_of(
+        tmp_path,
+        accuracy=accuracy,
+        **size,
+        **{"scene.source": wedge, "optics.psf": psf, "pixel.photodetector.fill_factor": 1.0},
+    )
+
+    def integral(u):
+        z = np.pi * u / pitch
+        return u / 2 + (z * sici(z)[0] + np.cos(z)) * pitch / np.pi**2
+
+    x = (np.arange(6) - 2.5) * width
+    signal = np.full(6, 1.0)
+    for border, step in zip((-1.5, 0, 1.5), np.diff(10.0 ** (-2 / 3 * np.arange(4))), strict=True):
+        for share, place in zip(planes.sum(axis=0) / planes.sum(), (-1, 0, 1), strict=True):
+            u = x - border * width - place * pitch
+            part = (integral(u + width / 2) - integral(u - width / 2)) / width
+            signal += step * share * part
+    white = 2 * 5e4  # all of the pixel counts, not half
+    error = rms(found / white - signal) / signal.max()
+    assert error < {"standard": 1e-3, "reference": 2e-4}[accuracy]
 
 
 def test_defocus_that_grows_to_the_corner_is_seen_there(tmp_path):

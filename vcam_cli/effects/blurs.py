@@ -47,6 +47,21 @@ class Blur(Effect):
             Frequency [cycles/m]; inf where there is no such frequency.
         """
 
+    def axis_cutoff(self, wavelength: float) -> float:
+        """Return the frequency along x, and along y, from which the transfer is zero.
+
+        Parameters
+        ----------
+        wavelength : float
+            Wavelength [m].
+
+        Returns
+        -------
+        float
+            Frequency [cycles/m]; inf where there is no such frequency.
+        """
+        return self.cutoff(wavelength)
+
     @abstractmethod
     def otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
         """Return the transfer at all pairs of frequencies. It is 1 at frequency 0.
@@ -63,6 +78,25 @@ class Blur(Effect):
         Array
             Transfer (m, n) without unit, complex where the blur is not symmetric.
         """
+
+    def smooth_otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
+        """Return the transfer as `otf_plane` does, but continued smoothly beyond `axis_cutoff`.
+
+        Tables are interpolated, which a jump does not allow; the axes of a spectrum end there.
+
+        Parameters
+        ----------
+        fx, fy : Array
+            Frequencies (n,) along x and (m,) along y [cycles/m].
+        wavelength : float
+            Wavelength [m].
+
+        Returns
+        -------
+        Array
+            Transfer (m, n) without unit, complex where the blur is not symmetric.
+        """
+        return self.otf_plane(fx, fy, wavelength)
 
     def spread(self, wavelengths: Array) -> Array:
         """Return a bound (J,) on |1 - H(f)| / (2 pi |f|) at wavelengths (J,) [m]; inf: none known.
@@ -87,6 +121,23 @@ class Blur(Effect):
             Bound (n,) without unit; 1 where no lower bound is known.
         """
         return np.ones(frequency.shape)
+
+    def line_tail(self, distance: Array) -> Array:
+        """Return a bound on the part of a line's light that falls beyond the reach, to one side.
+
+        Of a `RadialTransfer` it follows from the transfer (`bandwidth.line_spread_tail`) instead.
+
+        Parameters
+        ----------
+        distance : Array
+            Distances (n,) from the line less `reach`, rising [m].
+
+        Returns
+        -------
+        Array
+            Parts (n,), falling; 0 where the reach is that of all light, diffraction aside.
+        """
+        return np.zeros(len(distance))
 
     def kept_bytes(self, wavelengths: Array, by_harmonics: bool = False) -> int:
         """Return the memory that its transfer takes beside tables.

@@ -21,7 +21,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.image_formation.closed_spectrum import closed_spectrum
 from vcam_cli.image_formation.cosine_series import Axis
-from vcam_cli.image_formation.estimates.bandwidth import axes
+from vcam_cli.image_formation.estimates.bandwidth import axes, directed_tail_length
 from vcam_cli.image_formation.field_dependence import Mode, filtered_layers
 from vcam_cli.image_formation.filtering import Filter
 from vcam_cli.image_formation.optical_path import Layer, OpticalPath
@@ -30,7 +30,8 @@ from vcam_cli.scenes.base import ChartScene
 
 NEAR = 12.0
 """Distance from the array to the border of the near field, beyond the reach of the lens's blurs, in
-inverse cut-off frequencies: there the tail is smooth but for 0.2 % of itself."""
+inverse cut-off frequencies: there the tail is smooth but for 0.2 % of itself. Only the samples of
+a measured spread ring on, up to `directed_tail_length`."""
 LEAST_PIXELS, LEAST_PART = 8, 1 / 16
 """That distance in pixels, and in shorter sides of the array, at least. The cells of the innermost
 ring are a part of it, so a narrow near field makes the ring the larger of the two: `everything`
@@ -243,7 +244,7 @@ def near_field(path: OpticalPath, scene: ChartScene, widest: float) -> ChartScen
     asked = path.settings.oversampling
     if asked is not None:  # the spectrum ends there
         cutoff = min(cutoff, asked * 0.5 / max(g.pitch_x, g.pitch_y))
-    distance = NEAR / cutoff + widest
+    distance = max(NEAR / cutoff, directed_tail_length(path)) + widest
     distance = max(distance, LEAST_PART * min(g.sensor_width, g.sensor_height))
     margin = max(math.ceil(distance / min(g.pitch_x, g.pitch_y)), LEAST_PIXELS)
     width, height = (g.columns + 2 * margin) * g.pitch_x, (g.rows + 2 * margin) * g.pitch_y

@@ -74,7 +74,7 @@ def times_blurs(
     own[tables.radial_parity] = reader(tables, tables.radial_parity, f).values(f)
     factor = np.ones((2 * entries, entries), np.complex128)
     for blur in blurs:
-        factor *= blur.otf_plane(f, np.concatenate([f, -f]), wavelength)
+        factor *= blur.smooth_otf_plane(f, np.concatenate([f, -f]), wavelength)
     plus, minus = joined_parities(own)
     parts = split_by_parity(plus * (factor[:entries] - 1), minus * (factor[entries:] - 1))
     planes = tuple(part if np.any(part) else None for part in parts)

@@ -240,17 +240,31 @@ class Transfer:
         """Whether no color sees any light of the scene."""
         return not self.weights.any()
 
-    @cached_property
+    @property
     def cutoff(self) -> float:
         """Frequency above which every H_kc is zero [cycles/m]; inf without such a frequency."""
+        return self._cutoffs[0]
+
+    @property
+    def axis_cutoff(self) -> float:
+        """The same of the frequency along x, and along y [cycles/m]."""
+        return self._cutoffs[1]
+
+    @cached_property
+    def _cutoffs(self) -> tuple[float, float]:
         used = self.wavelengths[np.abs(self.weights).sum(axis=(0, 1)) > 0]
-        return _cutoff(self.effects, tuple(used.tolist())) if len(used) else 0.0
+        return _cutoffs(self.effects, tuple(used.tolist())) if len(used) else (0.0, 0.0)
 
 
 @remembered(8)
-def _cutoff(effects: tuple[Blur, ...], wavelengths: tuple[float, ...]) -> float:
-    """Return the frequency above which blurs pass nothing of any wavelength [cycles/m]."""
-    return min((max(map(effect.cutoff, wavelengths)) for effect in effects), default=math.inf)
+def _cutoffs(effects: tuple[Blur, ...], wavelengths: tuple[float, ...]) -> tuple[float, float]:
+    """Return frequencies above which blurs pass nothing of any wavelength [cycles/m].
+
+    They are the length of the frequency, and each of its components.
+    """
+    whole = min((max(map(effect.cutoff, wavelengths)) for effect in effects), default=math.inf)
+    along = (max(map(effect.axis_cutoff, wavelengths)) for effect in effects)
+    return whole, min(along, default=math.inf)
 
 
 def transfer(

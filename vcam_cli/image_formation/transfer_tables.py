@@ -375,7 +375,7 @@ class PlaneGrid:
         for part, radial, wavelength in zip(change, self.radial, wavelengths, strict=True):
             otf = np.ones(part.shape, np.complex128)
             for blur in blurs:
-                otf *= blur.otf_plane(self.frequency, fy, float(wavelength))
+                otf *= blur.smooth_otf_plane(self.frequency, fy, float(wavelength))
             np.multiply(otf - 1, radial, out=part)
         both = self.radial_transfer.spectral_sum(change)
         return split_by_parity(both[..., :m, :], both[..., m:, :])

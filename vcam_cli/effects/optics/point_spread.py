@@ -22,6 +22,12 @@ from vcam_cli.physics.cache import ByteCache
 PSF = "optics.psf"
 """Key under which the camera carries the samples of its point spread function."""
 
+LEAST_PHASE = 1e-3
+"""Phase below which the cosine integral, infinite at a sample itself, counts as there: 6.3."""
+
+ROUNDING = 1e-9
+"""Part of the Nyquist frequency within which a frequency counts as on it: nothing passes there."""
+
 
 @dataclass(frozen=True)
 class PointSpread(AberrationBlur, PlaneTransfer):
@@ -59,6 +65,26 @@ class PointSpread(AberrationBlur, PlaneTransfer):
         """How far from its place the blur throws almost all of the light, diffraction aside [m]."""
         return self._radius(0.99)
 
+    def line_tail(self, distance: Array) -> Array:
+        """Return the envelope of a line's light beyond the reach, to one side.
+
+        Samples that end at their Nyquist frequency F are sinc functions: of one at x a line leaves
+        1/2 - Si(2 pi F (u - x)) / pi beyond u, which rings with the amplitude 1 / (2 pi^2 F (u -
+        x)); with the cosine integral beside it, the sum's modulus is its envelope.
+        """
+        from scipy.special import sici
+
+        out = np.zeros(len(distance))
+        for axis, at in zip((1, 2), self._coordinates, strict=True):
+            for side in (1, -1):
+                z = np.subtract.outer(self.reach + distance, side * at) * (np.pi / self.pitch)
+                sine, cosine = sici(np.maximum(np.abs(z), LEAST_PHASE))
+                light = self._loaded_samples().sum(axis=axis).T
+                beyond = (0.5 - np.sign(z) * sine / np.pi) @ light, cosine / np.pi @ light
+                out = np.maximum(out, np.hypot(*beyond).max(axis=1))
+        falling: Array = np.maximum.accumulate(out[::-1])[::-1]
+        return falling
+
     def spread(self, wavelengths: Array) -> Array:
         """Return the mean distance (J,) of the light from its place [m]; inf before it is read."""
         if self.samples is None:
@@ -89,7 +115,15 @@ class PointSpread(AberrationBlur, PlaneTransfer):
         return x, y
 
     def otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
-        """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: complex (m, n)."""
+        """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: complex (m, n).
+
+        It is 0 beyond the Nyquist frequency of the samples.
+        """
+        within_x, within_y = (np.abs(f) < self.axis_cutoff(wavelength) for f in (fx, fy))
+        return self.smooth_otf_plane(fx, fy, wavelength) * np.outer(within_y, within_x)
+
+    def smooth_otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
+        """Return the Fourier sums of the samples, periodic in fx and fy: complex (m, n)."""
         key = (fx.tobytes(), fy.tobytes())
         channels = self._transfer_cache.get(key, lambda: self._channel_transfers(fx, fy))
         if len(self.wavelengths) < 2:
@@ -108,18 +142,19 @@ class PointSpread(AberrationBlur, PlaneTransfer):
         return ByteCache(0)
 
     def _channel_transfers(self, fx: Array, fy: Array) -> Array:
-        """Return the Fourier sums of the samples: (channels, m, n).
-
-        They are 0 beyond the Nyquist frequency of the samples.
-        """
+        """Return the Fourier sums of the samples: (channels, m, n)."""
         x, y = self._coordinates
-        along = np.exp(-2j * np.pi * np.outer(x, fx)) * (np.abs(fx) < 0.5 / self.pitch)
-        down = np.exp(-2j * np.pi * np.outer(fy, y)) * (np.abs(fy) < 0.5 / self.pitch)[:, None]
+        along = np.exp(-2j * np.pi * np.outer(x, fx))
+        down = np.exp(-2j * np.pi * np.outer(fy, y))
         return np.array([down @ plane @ along for plane in self._loaded_samples()])
 
     def cutoff(self, wavelength: float) -> float:
         """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
         return math.sqrt(0.5) / self.pitch
+
+    def axis_cutoff(self, wavelength: float) -> float:
+        """Return the Nyquist frequency of the samples, less what rounding may bring a term to."""
+        return (1 - ROUNDING) * 0.5 / self.pitch
 
     def mean_error(self, signal: SignalLevels) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""

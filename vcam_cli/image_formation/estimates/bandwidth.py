@@ -4,7 +4,7 @@ Pixels fold every frequency that the lens passes into the picture, so a skipped 
 Each of three approximations has its share of the tolerance:
 
 - the margin beyond the array, behind which a chart is mirrored: from the tail of the line spread
-  function;
+  function, that of a measured spread included;
 - the cells on which a chart is painted: `chart_cells.py`;
 - the highest frequency that is filtered: from the power spectrum itself.
 """
@@ -21,7 +21,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.effects.base import Effect, of_kind
-from vcam_cli.effects.blurs import RadialTransfer
+from vcam_cli.effects.blurs import PlaneTransfer, RadialTransfer
 from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.optical_path import OpticalPath
@@ -90,10 +90,11 @@ def margin(
     int
         Pixels on every side, such that transforms of the whole are fast.
     """
-    budget = MARGIN_SHARE * knobs.tolerance / (CONTRAST * max(overexposure, 1.0))
-    distance = np.geomspace(0.25 * min(geometry.pitch_x, geometry.pitch_y), 1.0, 80)
+    budget = _margin_part(knobs, overexposure)
+    distance = _distances(geometry)
     radial = of_kind(effects, RadialTransfer)
     tail = line_spread_tail(radial, band[1], distance)
+    tail += _directed_tail(of_kind(effects, PlaneTransfer), distance)
     cutoff = min((b.cutoff(band[1]) for b in radial), default=math.inf)
     widest = max((effect.reach for effect in effects), default=0.0)
     widest += sum((motion.travel for motion in of_kind(effects, ImageMotion)), 0.0)
@@ -115,6 +116,44 @@ def margin(
             break
         pixels = math.ceil(1.25 * pixels)
     return _fast(geometry, round(pixels * knobs.margin_scale))
+
+
+def _margin_part(knobs: Settings, overexposure: float) -> float:
+    """Return the part of a line's light that may come from another place."""
+    return MARGIN_SHARE * knobs.tolerance / (CONTRAST * max(overexposure, 1.0))
+
+
+def _distances(geometry: Geometry) -> Array:
+    """Return distances at which tails are tabulated, rising [m]."""
+    return np.geomspace(0.25 * min(geometry.pitch_x, geometry.pitch_y), 1.0, 80)
+
+
+def _directed_tail(blurs: Sequence[PlaneTransfer], distance: Array) -> Array:
+    """Return the part of a line's light beyond the reach of blurs with a direction: (n,)."""
+    tail = np.zeros(len(distance))
+    for blur in blurs:
+        tail += blur.line_tail(distance)
+    return tail
+
+
+def directed_tail_length(path: OpticalPath) -> float:
+    """Return how far beyond its reach a blur with a direction still throws light that counts.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        The path of the light.
+
+    Returns
+    -------
+    float
+        Distance [m]; less than a pixel where it throws none.
+    """
+    distance = _distances(path.geometry)
+    tail = _directed_tail(path.transfer.plane_blurs, distance)
+    white = float(path.transfer.level.max())
+    allowed = _margin_part(path.settings, white / path.full if path.full else math.inf)
+    return float(distance[np.searchsorted(-tail, -allowed).clip(max=len(distance) - 1)])
 
 
 def line_spread_tail(blurs: Sequence[RadialTransfer], wavelength: float, distance: Array) -> Array:
@@ -273,7 +312,7 @@ def axes(path: OpticalPath, scene: SampledScene, highest: float) -> tuple[Axis, 
     x, y : Axis
         The axes.
     """
-    g, cutoff = path.geometry, path.transfer.cutoff
+    g, cutoff = path.geometry, path.transfer.axis_cutoff
     ny, nx = scene.shape
     squares = scene.samples == "squares"
 
