@@ -16,6 +16,7 @@ import pytest
         ("array", "80184"),  # 1.4 times the variance: levels of pixels, not of joined ones
         ("field", "80012"),  # 1.2 T: few places on a stretch of the field
         ("lone", "80400"),  # 1.1 T: one pixel may lose more than all places do on average
+        ("chart", "100096"),  # 1.1 T: an edge lies alike to all cells, and to all pixels, along it
         ("moved", "100024"),  # 2.9 T: coarse samples of a spread ring beyond their grid
         ("moved", "100068"),  # 1.1 T: their transfer ends with a jump, not along a table
     ],

@@ -20,6 +20,8 @@ fill pixels count up to the error that would leave one of them unsaturated."""
 
 ALIGNED = 0.02
 """Slope of sides that lie along rows or columns: over 50 pixels they move by one at most."""
+EXACT = 1e-9
+"""Slope of sides that lie exactly along them: rounding."""
 
 
 @dataclass(frozen=True)
@@ -85,10 +87,23 @@ class EdgeEnergy:
     """Of edges along rows and columns [square of the light's unit / m]."""
     oblique: float = 0.0
     """Of edges of other directions, likewise."""
+    alike: float = 0.0
+    """Of the aligned ones, that of a line exactly along rows or columns: all of it lies in one
+    place of the cells, and of the pixels."""
 
     def __add__(self, other: EdgeEnergy) -> EdgeEnergy:
         """Return the energy of both."""
-        return EdgeEnergy(self.aligned + other.aligned, self.oblique + other.oblique)
+        return EdgeEnergy(
+            self.aligned + other.aligned, self.oblique + other.oblique, self.alike + other.alike
+        )
+
+    def at_least(self, other: EdgeEnergy) -> EdgeEnergy:
+        """Return the larger energy of each kind of edge."""
+        return EdgeEnergy(
+            max(self.aligned, other.aligned),
+            max(self.oblique, other.oblique),
+            max(self.alike, other.alike),
+        )
 
     def scaled(self, factor: float) -> EdgeEnergy:
         """Return it times a factor.
@@ -103,7 +118,7 @@ class EdgeEnergy:
         EdgeEnergy
             The product.
         """
-        return EdgeEnergy(self.aligned * factor, self.oblique * factor)
+        return EdgeEnergy(self.aligned * factor, self.oblique * factor, self.alike * factor)
 
 
 def counted_height(first: Array, second: Array, ceiling: float) -> Array:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -240,7 +240,7 @@ class WarpedChart(Chart):
         whole = Region(((left + right) / 2, (top + bottom) / 2), (right - left, bottom - top))
         found = [self.chart.edge_energy(part, level, ceiling) for part in (whole, region)]
         densest = max(found, key=lambda energy: energy.aligned + energy.oblique)
-        return densest.scaled(self.sees.scales[0])
+        return replace(densest.scaled(self.sees.scales[0]), alike=0.0)  # lines become curves
 
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
         """Write the averages over the cells between edges, of one size, into an array."""

@@ -7,6 +7,7 @@ all edges of the chart, with what lens and pixels pass, that is the error of the
 
     aligned edges    energy 1 / (2 pi f)^2 along the axes
     oblique edges    energy 2 / (2 pi |f|)^3 in the plane, in all directions alike
+    a single line    as aligned edges, but wherever it lies to cells and pixels: a bound
 
 `scenes.edge_energy` says how much edge a chart has.
 """
@@ -157,7 +158,7 @@ class CellError:
         found = [
             scene.chart.edge_energy(Region((0.0, 0.0), size), level, path.ceiling) for size in sizes
         ]
-        energy = EdgeEnergy(max(e.aligned for e in found), max(e.oblique for e in found))
+        energy = found[0].at_least(found[1])
         pitch = max(g.pitch_x, g.pitch_y)
         return cls(path, energy, min(path.transfer.cutoff, highest / (2 * pitch)))
 
@@ -204,24 +205,55 @@ class CellError:
         """
         g = self.path.geometry
         side = max(g.pitch_x, g.pitch_y) / per_pixel
-        squares = self.energy.aligned * self._of_aligned(side) if self.energy.aligned else 0.0
-        if self.energy.oblique:
-            squares += self.energy.oblique * self._of_oblique(side)
-        return SURE * math.sqrt(squares * self.path.scatter)
+        energy, squares = self.energy, 0.0
+        if anywhere := energy.aligned - energy.alike:
+            squares += anywhere * self._of_aligned(side)
+        if energy.oblique:
+            squares += energy.oblique * self._of_oblique(side)
+        squares *= SURE**2 * self.path.scatter
+        if energy.alike:
+            squares += energy.alike * self._of_alike(side)
+        return math.sqrt(squares)
 
     def _of_aligned(self, side: float) -> float:
         """Return the mean square for edges along rows and columns of energy 1 [m]."""
         f, _ = self._table
-        zero, found = np.zeros_like(f), []
-        for axes in ((f, zero), (zero, f)):
-            passed = self._passed(*axes)
-            turns = np.minimum(f * side, 0.5)  # beyond, nothing is folded but all is lost
-            parts = (np.square(_folded(turns, k) * side / (2 * np.pi * (turns + k))) for k in FOLDS)
-            folded = sum(parts, zero)
-            own = 1 / np.square(2 * np.pi * np.maximum(f, 1e-9 * self.top))
-            inside = turns < 0.5
-            found.append(2 * float(np.trapezoid(passed * np.where(inside, folded, own), f)))
+        turns = f * side
+        parts = (np.square(_folded(turns, k) * side / (2 * np.pi * (turns + k))) for k in FOLDS)
+        folded = np.where(turns < 0.5, sum(parts, np.zeros_like(f)), np.square(self._lost))
+        return max(2 * float(np.trapezoid(passed * folded, f)) for passed in self._passed_across)
+
+    def _of_alike(self, side: float) -> float:
+        """Return a bound on the mean square for a line along rows or columns of energy 1 [m].
+
+        Wherever it lies to the cells, what they fold is at most the sum of the magnitudes, of all k
+        together f (pi^2 / sin^2(pi f d) - 1 / (f d)^2) d^2 / 2 pi. Wherever it lies to the pixels,
+        these fold at most the sum of what they sample.
+        """
+        f, _ = self._table
+        turns = np.clip(f * side, 1e-9, 0.5)
+        folded = turns * side / (2 * np.pi) * (np.square(np.pi / np.sin(np.pi * turns)) - turns**-2)
+        error = np.where(turns < 0.5, folded, self._lost)
+        g, found = self.path.geometry, []
+        for passed, pitch in zip(self._passed_across, (g.pitch_x, g.pitch_y), strict=True):
+            own = np.linspace(-0.5, 0.5, len(f)) / pitch
+            most = math.ceil(self.top * pitch + 0.5)
+            places = np.abs(np.add.outer(np.arange(-most, most + 1) / pitch, own))
+            seen = np.interp(places, f, np.sqrt(passed) * error, right=0.0).sum(axis=0)
+            found.append(float(np.trapezoid(np.square(seen), own)))
         return max(found)
+
+    @cached_property
+    def _passed_across(self) -> tuple[Array, Array]:
+        """The squared transfer (n,) of waves along x, and along y."""
+        f, _ = self._table
+        return self._passed(f, np.zeros_like(f)), self._passed(np.zeros_like(f), f)
+
+    @cached_property
+    def _lost(self) -> Array:
+        """What an edge of energy 1 has at the frequencies (n,) [m]."""
+        f, _ = self._table
+        return np.asarray(1 / (2 * np.pi * np.maximum(f, 1e-9 * self.top)))
 
     def _of_oblique(self, side: float) -> float:
         """Return the same for edges of all directions."""

@@ -6,14 +6,20 @@ beyond it. Reflectances (1 - contrast) / 2 and (1 + contrast) / 2.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.scenes import polygons
 from vcam_cli.scenes.base import Chart
-from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, counted_height, outline_energy
+from vcam_cli.scenes.edge_energy import (
+    EXACT,
+    EdgeEnergy,
+    Region,
+    counted_height,
+    outline_energy,
+)
 
 MEAN = 0.5
 """Mean reflectance."""
@@ -53,7 +59,12 @@ class SiemensStar(Chart):
         ends = far * np.stack([np.cos(angle), np.sin(angle)])
         dark, bright = (MEAN * (1 + s * self.contrast) * float(level[0]) for s in (-1, 1))
         height = float(counted_height(np.array(dark), np.array(bright), ceiling))
-        return outline_energy(np.zeros_like(ends), ends, height, region)
+        found = outline_energy(np.zeros_like(ends), ends, height, region)
+        upright = ends[
+            :, np.abs(ends[0]) <= EXACT * far
+        ]  # of an odd number of spokes; none is level
+        line = outline_energy(np.zeros_like(upright), upright, height, region)
+        return replace(found, alike=line.aligned)
 
     def _triangles(self, reach: float) -> polygons.Sides:
         """Return the bright spokes up to a distance [m]."""

@@ -14,7 +14,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.scenes.base import Chart
 from vcam_cli.scenes.closed_form import Profile
-from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, counted_height
+from vcam_cli.scenes.edge_energy import EXACT, EdgeEnergy, Region, counted_height
 from vcam_cli.scenes.runs import expand_ranges
 
 MEAN = 0.5
@@ -71,7 +71,10 @@ class SlantedEdge(Chart):
         length = float(region.lengths_inside(-end, end)[0])
         dark, bright = (MEAN * (1 + s * self.contrast) * float(level[0]) for s in (-1, 1))
         height = float(counted_height(np.array(dark), np.array(bright), ceiling))
-        return EdgeEnergy(aligned=height * length / region.area)
+        energy = height * length / region.area
+        return EdgeEnergy(
+            aligned=energy, alike=energy if min(abs(across), abs(down)) <= EXACT else 0.0
+        )
 
     def profile(self) -> Profile:
         """Return the two sides of the edge."""
