@@ -42,9 +42,7 @@ def cheap(
     return {
         f"vcam plan of {pixels:.2g} MP, still-life": _plans(repeats, large),
         f"sequences of {frames} frames, over as many frames alone": _sequences(repeats, frames),
-        f"2 columns of {long_side} pixels, over 2 rows": {
-            "frame": _tall(repeats, long_side) | {"at_most": TALL_OVER_WIDE}
-        },
+        f"thin arrays of {2 * long_side} pixels": _thin(repeats, long_side),
         f"processes, over the imports of {', '.join(IMPORTS)}": _start_up(repeats),
     }
 
@@ -97,17 +95,23 @@ def _over_alone(repeats: int, camera: Camera, count: int) -> Row:
     return one.ratio(other)
 
 
-def _tall(repeats: int, long_side: int) -> Row:
-    """Noise and readout of short rows over those of short columns."""
-    even = "scene.source={chart: uniform, reflectance: 0.5}", "output.render=none"
-    sizes = (long_side, 2), (2, long_side)
-    cameras = [load("starter", [f"array.rows={r}", f"array.columns={c}", *even]) for r, c in sizes]
+def _thin(repeats: int, long_side: int) -> dict[str, Row]:
+    """Two columns of pixels over two rows, and either over an array of usual shape."""
+    usual = int((2 * long_side / 1.5) ** 0.5)
+    shapes = (long_side, 2), (2, long_side), (usual, 2 * long_side // usual)
+    found: dict[str, Row] = {}
+    for chart in "{chart: uniform, reflectance: 0.5}", "{chart: colorchecker}":
 
-    def taken(camera: Camera) -> Callable[[], Cost]:
-        return lambda: run_cost(lambda: simulate(camera, 1))
+        def taken(rows: int, columns: int, chart: str = chart) -> Callable[[], Cost]:
+            size = f"array.rows={rows}", f"array.columns={columns}"
+            camera = load("starter", [*size, f"scene.source={chart}", "output.render=none"])
+            return lambda: run_cost(lambda: simulate(camera, 1, shared=Shared()))
 
-    tall, wide = take_turns(repeats, *map(taken, cameras))
-    return tall.ratio(wide)
+        tall, wide, square = take_turns(repeats, *(taken(*shape) for shape in shapes))
+        name = chart[1:-1].partition(",")[0]
+        found[f"{name}: 2 columns over 2 rows"] = tall.ratio(wide) | {"at_most": TALL_OVER_WIDE}
+        found[f"{name}: 2 rows over 2:3"] = wide.ratio(square)
+    return found
 
 
 def _start_up(repeats: int) -> dict[str, Row]:

@@ -72,7 +72,7 @@ def test_every_part_is_there(found):
     for word in (
         "frame over R_compute", "shares", "shipped", "photograph", "eight layers",
         "plain NumPy", "wavelengths", "without", "sweep", "growth", "schedules", "command",
-        "data set", "forecast", "Dask", "plan of", "sequences", "2 columns", "processes",
+        "data set", "forecast", "Dask", "plan of", "sequences", "thin arrays", "processes",
     ):  # fmt: skip
         assert word in titles
     # Frames have their shares besides, layers another denominator, what is repeated six, and what

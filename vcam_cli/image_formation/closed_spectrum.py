@@ -16,7 +16,7 @@ import scipy.fft
 from vcam_cli.arrays import Array
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.scene_spectrum import Index, SceneSpectrum, pairs
-from vcam_cli.parallel import AT_ONCE, product, slices_within
+from vcam_cli.parallel import AT_ONCE, PRODUCT, product, slices_within
 from vcam_cli.scenes.base import ChartScene
 from vcam_cli.scenes.cells import cell_edges
 from vcam_cli.scenes.closed_form import LightDisc, Rectangles
@@ -326,20 +326,25 @@ class ProductSpectrum:
             Sums (pairs, len(y) - 1, len(x) - 1), in the order of `scene_spectrum.pairs`.
         """
         planes, runs, columns = self.along_x.shape
-        below = (self.along_y[s].astype(np.float64) for s in _blocks(y))
-        in_rows = np.array([block.T @ block for block in below]).reshape(-1, runs**2)
-        out = []
-        for plane in range(planes):
-            others = self.along_x[plane:].reshape(-1, columns)
-            beside = (others[:, s].astype(np.float64) for s in _blocks(x))
-            in_columns = np.array([block[:runs] @ block.T for block in beside])
-            for other in np.split(in_columns, planes - plane, axis=2):
-                out.append(product(in_rows, other.reshape(-1, runs**2).T))
+        in_rows = _sums_of_products(self.along_y.T, y).reshape(-1, runs**2)
+        in_columns = _sums_of_products(self.along_x.reshape(-1, columns), x)
+        in_columns = in_columns.reshape(-1, planes, runs, planes, runs)
+        out = [
+            product(in_rows, in_columns[:, r, :, s].reshape(-1, runs**2).T)
+            for r, s in pairs(planes)
+        ]
         return np.array(out)
 
 
-def _blocks(edges: Array) -> list[slice]:
-    return [slice(*ends) for ends in pairwise(edges)]
+def _sums_of_products(values: Array, edges: Array) -> Array:
+    """Return the sums of products of all rows (n, terms) over blocks: (len(edges) - 1, n, n)."""
+    longest = max(16, PRODUCT // len(values) ** 2)  # of long rows a BLAS takes 20 times as long
+    out = np.zeros((len(edges) - 1, len(values), len(values)))
+    for total, block in zip(out, pairwise(edges), strict=True):
+        for some in slices_within(slice(*block), longest):
+            part = np.ascontiguousarray(values[:, some], np.float64)
+            total += product(part, part.T)
+    return out
 
 
 def rectangle_spectrum(
