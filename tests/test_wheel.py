@@ -117,7 +117,7 @@ def test_nothing_else(wheel):
 
 def test_the_program_is_announced(installed):
     (entry,) = installed.glob("*.dist-info/entry_points.txt")
-    assert "vcam = vcam_cli.commands.main:main" in entry.read_text()
+    assert "vcam = vcam_cli.commands.main:program" in entry.read_text()
 
 
 def test_shipped_cameras_load_from_the_unpacked_wheel(installed, tmp_path):
