@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from making import camera as camera_of
+from numpy.polynomial.legendre import legval2d
 
 from vcam_cli import load, simulate
 from vcam_cli.camera.derived.geometry import geometry
@@ -18,7 +19,8 @@ from vcam_cli.effects.optics.traced_blur import TracedBlur
 from vcam_cli.errors import BadInput
 from vcam_cli.lenses.fields import View
 from vcam_cli.lenses.files import shipped_lens
-from vcam_cli.lenses.wavefronts import trace_field
+from vcam_cli.lenses.wavefronts import ORDER, trace_field
+from vcam_cli.physics.shaped_pupil import tensor
 
 PHONE = "phone-double-gauss"
 FULL_SIZE = "optics.prescription={use: double-gauss, scale: 1, image_plane: file}"
@@ -179,3 +181,44 @@ def test_a_run_notes_what_it_ignores_and_its_report_has_the_lens(tmp_path):
     assert len(ignored) == 1
     found.save(tmp_path / "out")
     assert "Traced lens" in (tmp_path / "out" / "report.html").read_text("utf-8")
+
+
+def dense_sum(place, fx, fy, wave, samples=240):
+    """The transfer at one frequency as a sum over points of the pupil, none of them on a grid."""
+    half = place.wavefront.half_frame(wave)
+    sx, sy = wave * fx / half[0], wave * fy / half[1]
+    at = (np.arange(samples) + 0.5) * (2 / samples) - 1
+    x, y = (a.ravel() for a in np.meshgrid(at, at))
+    contains = place.wavefront.contains
+    both = contains(x - sx / 2, y - sy / 2) & contains(x + sx / 2, y + sy / 2)
+    x, y = x[both], y[both]
+    waves = tensor(place.wavefront.terms(wave) / wave, ORDER)
+    one = legval2d(x - sx / 2, y - sy / 2, waves)
+    other = legval2d(x + sx / 2, y + sy / 2, waves)
+    total = np.exp(2j * np.pi * (one - other)).sum() / contains(*np.meshgrid(at, at)).sum()
+    return total * np.exp(-2j * np.pi * fx * place._shift(wave))
+
+
+def test_harmonics_are_sums_over_the_pupil():
+    blur = blur_of(camera())
+    place = blur.at_heights(np.array([0.8 * blur.half_diagonal]))[0]
+    f = np.array([12e3, 118e3, 240e3])
+    waves = np.array([430e-9, 610e-9])
+    found = place.harmonics(f, waves)
+    orders = np.arange(found.shape[-1])
+    for angle in (0.4, 2.5):
+        terms = found * np.exp(1j * orders * angle)
+        whole = np.where(orders % 2, 1j * terms.imag, terms.real).sum(axis=-1)
+        way = math.cos(angle), math.sin(angle)
+        expected = [[dense_sum(place, way[0] * at, way[1] * at, w) for at in f] for w in waves]
+        assert np.abs(whole - expected).max() < 1e-3
+
+
+def test_further_frames_through_a_lens_share_its_tables():
+    f, waves = np.array([12e3, 118e3]), np.array([430e-9, 610e-9])
+    first, again = (blur_of(camera()).rings(5)[2].blur for _ in range(2))
+    assert (first.harmonics(f, waves) == again.harmonics(f, waves)).all()
+    assert not again.kept
+    wider = "optics.prescription={use: double-gauss, scale: 0.0905, f_number: 5.6}"
+    other = blur_of(camera(wider)).rings(5)[2].blur
+    assert abs(other.harmonics(f, waves)[..., 0] - first.harmonics(f, waves)[..., 0]).max() > 1e-4

@@ -8,7 +8,9 @@ aberrations and of diffraction.
 
 Cells at the edge count by the part of them that lies inside, sharpened by a 24th of the
 Laplacian: the OTF of a disk of 128 samples errs by 2e-4, of 256 by 7e-5. Between lags cubic
-splines interpolate what differs from the OTF of a disk, whose cusp at 0 they would blunt.
+splines interpolate what differs from the OTF of a disk, whose cusp at 0 they would blunt. Their
+coefficients come from the same transform as the lags: that takes 1.9 ms for 192 samples, recursive
+filters of the lags take 4.9.
 """
 
 from __future__ import annotations
@@ -16,10 +18,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.parallel import product
 from vcam_cli.physics import diffraction
 
 FEWEST, MOST = 128, 640
@@ -199,7 +203,8 @@ def otf_grid(pupil: Mask, waves: Array, order: int, farthest: float = 2.0) -> Ot
         The OTF over lags in half frames.
     """
     vander = np.polynomial.legendre.legvander(places(pupil), order)
-    return grid_of_paths(pupil, vander @ tensor(waves, order).T @ vander.T, farthest)
+    turns = product(vander @ tensor(waves, order).T, np.ascontiguousarray(vander.T))
+    return grid_of_paths(pupil, turns, farthest)
 
 
 def places(pupil: Mask) -> Array:
@@ -225,7 +230,6 @@ def grid_of_paths(pupil: Mask, turns: Array, farthest: float = 2.0) -> OtfGrid:
         The OTF over lags in half frames.
     """
     from scipy import fft
-    from scipy.ndimage import spline_filter
 
     samples = pupil.samples
     phase = (2 * np.pi * (turns - np.rint(turns))).astype(np.float32)
@@ -235,16 +239,43 @@ def grid_of_paths(pupil: Mask, turns: Array, farthest: float = 2.0) -> OtfGrid:
     field *= pupil.weights
     most = min(math.ceil(farthest / pupil.step) + MIRRORED_LAGS, samples)
     size = fft.next_fast_len(samples + most)
-    spectrum = fft.fft2(field, (size, size))
+    spectrum = fft.fft(fft.fft(field, size, axis=1), size, axis=0)  # few rows are not empty
     power = spectrum.real**2 + spectrum.imag**2
+    # Sharpened weights are right for what two pupils share, their squares are not: at the lag 0
+    # all of the light is there.
+    total = float(pupil.weights.sum())
+    power += np.float32(total - power.mean(dtype=np.float64))
+    sharp = _to_spline(size)
+    power *= sharp[:, None]
+    power *= sharp
     # of a real function only half of the lags are needed; those to the left are conjugate
-    lags = fft.rfft2(power)[:, : most + 1] / np.float32(size**2 * pupil.weights.sum())
-    otf = np.concatenate([lags[-most:], lags[: most + 1]])
-    otf[most, 0] = 1.0
+    lags = fft.rfft2(power)[:, : most + 1] / np.float32(size**2 * total)
+    right = np.concatenate([lags[-most:], lags[: most + 1]])
+    left = right[::-1, MIRRORED_LAGS:0:-1].conj()
+    spline = np.concatenate([left, right], axis=1)
     disk = math.sqrt(pupil.share)
-    at = np.arange(-most, most + 1) * pupil.step
-    otf -= _disk(np.hypot(at[:, None], at[most:]) / (2 * disk)).astype(np.float32)
-    left = otf[::-1, MIRRORED_LAGS:0:-1].conj()
-    whole = np.concatenate([left, otf], axis=1)
-    known = farthest if most < samples else 2.0
-    return OtfGrid(pupil.step, disk, spline_filter(whole, 3, output=np.complex64), known)
+    spline -= _disk_spline(samples, disk)[samples - most : samples + most + 1, : spline.shape[1]]
+    return OtfGrid(pupil.step, disk, spline, farthest if most < samples else 2.0)
+
+
+def _to_spline(size: int) -> Array:
+    """Return the factor (size,) by which values become coefficients of their cubic spline.
+
+    It acts on the discrete Fourier transform of values, whose ends meet.
+    """
+    turns = 2 * np.pi * np.arange(size) / size
+    return np.asarray(3 / (2 + np.cos(turns)), np.float32)
+
+
+@lru_cache(maxsize=2)
+def _disk_spline(samples: int, disk: float) -> Array:
+    """Return the spline of a disk's OTF at all lags of a grid, as `OtfGrid.spline` has it.
+
+    Wavelengths of one place share it.
+    """
+    from scipy.ndimage import spline_filter
+
+    down = np.arange(-samples, samples + 1) * (2 / (samples - 2))
+    right = down[samples - MIRRORED_LAGS :]
+    otf = _disk(np.hypot(down[:, None], right) / (2 * disk))
+    return np.asarray(spline_filter(otf, 3, output=np.float32))
