@@ -10,6 +10,7 @@ standard normal per pixel for each of five noise sources. The parts, by default 
     shipped      every shipped camera, over R_compute of its own size
     painted      a painted chart beside a photograph of its size; its peak memory
     layers       eight layers over the same seen flat, and over one of them alone
+    lens         a traced lens over one wavefront with its distortion
     plain        a plain NumPy pipeline, wavelength by wavelength, over the frame
     wavelengths  301 wavelengths over 31
     effects      a frame over the same without one effect

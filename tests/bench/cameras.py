@@ -16,6 +16,10 @@ from numpy.typing import NDArray
 
 from vcam_cli import load
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import geometry
+from vcam_cli.camera.derived.prescription import distortion
+from vcam_cli.camera.derived.traced import traced_view
+from vcam_cli.config import shipped
 from vcam_cli.files.images.png import write_png
 from vcam_cli.scenes.base import View
 from vcam_cli.scenes.build import build
@@ -148,6 +152,35 @@ class Studio:
             tree["scene"] = lit
             cameras.append(load(self.write(tree, f"{name}.yaml")))
         return cameras[0], cameras[1]
+
+    def lenses(self, source: str) -> tuple[Camera, Camera]:
+        """The shipped double Gauss before a scene, and one wavefront with its distortion.
+
+        The wavefront has the rms of the double Gauss in its center, 0.2 waves at 550 nm.
+        """
+        sets = (
+            f"scene.source={source}",
+            f"array={{rows: {self.rows}, columns: {self.columns}, pattern: bayer-rggb}}",
+            f"pixel.width={9.6e3 / self.columns:.6g} um",
+        )
+        traced = load("double-gauss", sets)
+        solved = geometry(traced)
+        corner = float(np.hypot(solved.sensor_width, solved.sensor_height)) / 2
+        view = traced_view(traced, solved.object_distance)
+        assert view is not None
+        known = distortion(view, corner)
+        lines = [f"{1e3 * h},{100 * v}" for h, v in zip(known.heights, known.values, strict=True)]
+        table = self.folder / "distortion.csv"
+        table.write_text("\n".join(["image_height_mm,distortion_percent", *lines[::8]]))
+        tree = yaml.safe_load(shipped.find("cameras", "double-gauss").read_text())
+        del tree["optics"]["prescription"]
+        tree["optics"] |= {
+            "f_number": 8,
+            "focal_length": f"{1e3 * solved.focal_length} mm",
+            "zernike": {4: "90 nm", 11: "60 nm"},
+            "distortion": {"file": str(table)},
+        }
+        return traced, load(self.write(tree, "wavefront.yaml"), sets)
 
 
 @lru_cache(maxsize=4)

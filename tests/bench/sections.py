@@ -55,6 +55,15 @@ PAINTED_MEMORY = 1.3
 """What a painted chart of 12 megapixels may take of memory [GB]."""
 LAYERS_OVER_FLAT = 4.0
 """What a scene of eight layers may cost over a flat frame, of them or of one of them."""
+LENS_OVER_WAVEFRONT = 3.0
+"""What a frame through a traced lens may cost over one with one wavefront and its distortion."""
+LENS_SCENES = {
+    "photograph": "{kind: image, file: %s}",
+    "ColorChecker": "{kind: chart, chart: colorchecker}",
+    "slanted edge": "{kind: chart, chart: slanted-edge}",
+    "leaves": "{kind: chart, chart: dead-leaves}",
+}
+"""Scenes before the lens; the photograph is the street that ships."""
 START_UP = 0.3
 """What `vcam run` may take beyond the bare imports [s]."""
 IMPORTS = ("numpy", "scipy.fft", "pydantic", "OpenImageIO", "typer")
@@ -150,6 +159,23 @@ def layers(place: Studio, repeats: int, kinds: Sequence[str] = ()) -> dict[str, 
         "eight layers over the same without depth": same,
         "eight layers over the last of them alone": alone,
     }
+
+
+def traced_lens(place: Studio, repeats: int, scenes: Sequence[str] = ()) -> dict[str, Section]:
+    """The shipped double Gauss over one wavefront with its distortion; frames take turns."""
+    found: Section = {}
+    street = shipped.find("scenes", "street").with_suffix(".png")
+    for name in scenes or LENS_SCENES:
+        source = LENS_SCENES[name].replace("%s", str(street))
+        traced, plain_lens = (Frames(camera) for camera in place.lenses(source))
+        for taken in (traced, plain_lens):
+            taken.take(0, warm=True)
+        for _ in range(repeats):
+            for taken in (traced, plain_lens):
+                taken.take()
+        ratio = traced.cost.ratio(plain_lens.cost)
+        found[name] = {**ratio, "at_most": LENS_OVER_WAVEFRONT}
+    return {"the double Gauss over one wavefront with its distortion": found}
 
 
 def against_plain(

@@ -52,6 +52,10 @@ class Size:
     """Rows and columns of the frames with layers."""
     layered: tuple[str, ...] = ()
     """Some of the layered scenes; () for all."""
+    lens: tuple[int, int] = (1224, 1632)
+    """Rows and columns of the frames through a traced lens."""
+    before_lens: tuple[str, ...] = ()
+    """Some of the scenes before it; () for all."""
     shipped: tuple[str, ...] = ()
     """Some of the shipped cameras; () for all."""
     busy: dict[str, Any] = field(default_factory=lambda: BUSY)
@@ -77,6 +81,7 @@ QUICK = Size(
     effects=("aberration", "stray_light", "pixel_vignetting", "microlens", "shot_noise", "fpn"),
     varied=("exposure time",),
     layers=(216, 288),
+    lens=(216, 288),
     shipped=("starter", "csf-monochrome", "eye-chart"),
     cheap=((5792, 8688), 100_000, 4),
 )
@@ -128,6 +133,11 @@ def _layers(bench: Bench) -> dict[str, Section]:
     return sections.layers(bench.studio(size.layers), size.few, size.layered)
 
 
+def _lens(bench: Bench) -> dict[str, Section]:
+    size = bench.size
+    return sections.traced_lens(bench.studio(size.lens), size.few, size.before_lens)
+
+
 def _plain(bench: Bench) -> dict[str, Section]:
     size = bench.size
     place = bench.studio(size.frame)
@@ -173,6 +183,7 @@ PARTS: dict[str, Callable[[Bench], dict[str, Section]]] = {
     "shipped": _shipped,
     "painted": _painted,
     "layers": _layers,
+    "lens": _lens,
     "plain": _plain,
     "wavelengths": _wavelengths,
     "effects": _effects,
