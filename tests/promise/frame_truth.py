@@ -43,7 +43,8 @@ def truth(frame: Frame, camera: Camera) -> Exact:
     """Mean electrons of every raw pixel before saturation, and what is left of their error."""
     own = setup(frame, camera)
     found = light(frame, camera, own)
-    photo = gained(own, found.mean)
+    # Samples of a measured spread are sinc functions, whose lobes pass below zero: light does not.
+    photo = gained(own, np.maximum(found.mean, 0.0))
     time = exposure_time(camera, own, photo)
     electrons = time / own.time * photo + own.dark_rate * time
     mean = binned(camera, electrons)

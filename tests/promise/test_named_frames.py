@@ -18,6 +18,7 @@ import pytest
         ("lone", "80400"),  # 1.1 T: one pixel may lose more than all places do on average
         ("chart", "100096"),  # 1.1 T: an edge lies alike to all cells, and to all pixels, along it
         ("moved", "100024"),  # 2.9 T: coarse samples of a spread ring beyond their grid
+        ("moved", "200218"),  # lobes of coarse samples below zero: light is clipped there
         ("moved", "100068"),  # 1.1 T: their transfer ends with a jump, not along a table
     ],
 )
