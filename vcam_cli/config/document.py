@@ -6,6 +6,7 @@ place in the file they come from, and as many as can be known are reported at on
 in one section keeps back only the checks that need it.
 """
 
+import operator
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -136,9 +137,12 @@ def absolute_files(tree: Node, keys: frozenset[Key], findings: Findings) -> tupl
         if isinstance(node.value, dict):
             own = node.value["kind"].value if "kind" in node.value else None
             entries = {k: visit(child, child_path(path, k), own) for k, child in node.value.items()}
-            return replace(node, value=entries)
+            is_same = all(entries[key] is child for key, child in node.value.items())
+            return node if is_same else replace(node, value=entries)
         if isinstance(node.value, list):
-            return replace(node, value=[visit(c, (*path, i)) for i, c in enumerate(node.value)])
+            items = [visit(child, (*path, i)) for i, child in enumerate(node.value)]
+            is_same = all(map(operator.is_, items, node.value))
+            return node if is_same else replace(node, value=items)
         return node
 
     return visit(tree, ()), files

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from vcam_cli.devices.processor import Processor
+from vcam_cli.devices.processor import PROCESSOR, Processor
 
 DEVICES = ("cpu", "gpu")
 
@@ -23,7 +23,7 @@ def open_device(name: str) -> Processor:
         Where there is no such device, or no library for it.
     """
     if name == "cpu":
-        return Processor()
+        return PROCESSOR
     if name != "gpu":
         raise ValueError(f"device {name!r}; write one of {', '.join(DEVICES)}")
     from vcam_cli.devices.cuda import open_cuda

@@ -180,7 +180,9 @@ class Filter:
         return Series(self.x, parts)
 
     def on(self, device: Processor) -> Filter:
-        """Return the same filter for spectra on a device."""
+        """Return the same filter for spectra on a device; itself where it is on that device."""
+        if device is self._device:
+            return self
         return replace(self, x=replace(self.x, device=device), y=replace(self.y, device=device))
 
     @property

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
-from vcam_cli.devices.processor import Processor
+from vcam_cli.devices.processor import PROCESSOR, Processor
 from vcam_cli.image_formation.rate_cache import RateCache
 from vcam_cli.progress import Stages
 
@@ -19,7 +19,7 @@ class Run:
     """Observer of the stages."""
     rate_cache: RateCache | None = None
     """Cache of the light for further cameras."""
-    device: Processor = field(default_factory=Processor)
+    device: Processor = PROCESSOR
     """Where light is filtered, and charge, noise and codes are computed."""
     earlier: float = 0.0
     """Estimated time of what came before, such as the autofocus; the plan counts it [s]."""
