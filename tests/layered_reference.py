@@ -4,6 +4,7 @@ Nothing here is shared with the package: a thin lens, a sum over points of its a
 pixel, pictures of even squares.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -234,7 +235,18 @@ def slope_sum(light: np.ndarray, ends: tuple[float, float], focus: float) -> np.
     return total / len(k)
 
 
-def pupil_sum(scene: Scene, wavelength: float, points: int = 800, fine: int = 11) -> np.ndarray:
+Opens = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""Where an aperture lets light through, right of the axis and below it [radii]: the shape that near
+points out of focus show."""
+
+
+def pupil_sum(
+    scene: Scene,
+    wavelength: float,
+    points: int = 800,
+    fine: int = 11,
+    opens: Opens | None = None,
+) -> np.ndarray:
     """The same with diffraction: a sum over points of the pupil, for incoherent light.
 
     The transfer of a frequency f is the overlap of the pupil with itself, 2 wavelength N f apart.
@@ -243,6 +255,7 @@ def pupil_sum(scene: Scene, wavelength: float, points: int = 800, fine: int = 11
     (H. H. Hopkins, Proc. R. Soc. A 231, 91, 1955, with layers that hide each other by rays). How
     many of the points that is, is not left to their number: near the cut-off it is few of them. The
     area of overlap is 2/pi (acos nu - nu sqrt(1 - nu^2)) of the pupil's at nu times the cut-off.
+    With `opens` it is a sum over the points of a fine grid.
     Against 3200 points the sum over 800 is 0.03 % rms of full signal apart.
     It takes 2 pitch / (wavelength N) samples to a pixel, `fine`, to have all frequencies there are.
     """
@@ -264,10 +277,23 @@ def pupil_sum(scene: Scene, wavelength: float, points: int = 800, fine: int = 11
         # Both u + apart and u - apart lie within the radius 1.
         between = 2 * np.abs(np.float32(u) * apart_x + np.float32(v) * apart_y)
         inside = apart_x**2 + apart_y**2 + between <= 1 - u**2 - v**2
+        if opens is not None:  # a ray through (u, v) brings a near point to the other side
+            inside &= opens(apart_x - u, apart_y - v) & opens(-apart_x - u, -apart_y - v)
         total += np.where(inside, seen, 0)
         counted += inside
     nu = np.minimum(np.hypot(apart_x, apart_y), 1)
     overlap = 2 / np.pi * (np.arccos(nu) - nu * np.sqrt(1 - nu**2))
+    if opens is not None:
+        overlap = overlap_of(opens, 2 * apart_x[0], 2 * apart_y[:, 0])
     picture = scipy.fft.irfft2(total * (overlap / np.maximum(counted, 1)), (n, n))
     inner = slice(beyond * fine, -beyond * fine)
     return picture[inner, inner].reshape(SIDE, fine, SIDE, fine).mean(axis=(1, 3))
+
+
+def overlap_of(opens: Opens, x: np.ndarray, y: np.ndarray, samples: int = 512) -> np.ndarray:
+    """Part of an opening that it shares with itself displaced by x (n,) and y (m,): (m, n)."""
+    at = (np.arange(samples) + 0.5) * (2 / samples) - 1
+    let = np.fft.rfft2(opens(*np.meshgrid(at, at)).astype(float), (2 * samples,) * 2)
+    shared = np.fft.irfft2(np.abs(let) ** 2, (2 * samples,) * 2)
+    columns, rows = (np.rint(np.clip(lags, -2, 2) * (samples / 2)).astype(int) for lags in (x, y))
+    return np.asarray(shared[np.ix_(rows, columns)] / shared[0, 0])

@@ -134,6 +134,11 @@ def tree(number: int) -> dict:
         },
         "adc": {"bits": int(rng.integers(8, 15)), "noise": "0.7 DN"},
     }
+    if number % 8 == 6:
+        shape = {"blades": int(rng.integers(5, 10)), "rotation": f"{rng.uniform(0, 60):.3g} deg"}
+        vanes = {"count": int(rng.integers(1, 5)), "width": spread(0.5, 10, "%")}
+        shape |= {"obscuration": spread(5, 50, "%")} if number % 16 == 6 else {}
+        drawn["optics"]["aperture"] = shape | ({"spiders": vanes} if number % 16 == 14 else {})
     lengths = drawn["pixel"]["width"], drawn["optics"]["focal_length"]
     width, focal_length = (float(length.split()[0]) for length in lengths)
     in_scene = 1e-3 * width / focal_length  # a pixel's width, at 1 m [m]

@@ -56,10 +56,14 @@ def test_nobody_asks_for_nothing_is_done(case):
         (4, {"reset_noise", "flicker", "motion", "depth"}),
         (7, {"charge_transfer", "smear", "flicker", "depth"}),
         (8, {"reset_noise", "motion"}),
+        (22, {"reset_noise", "flicker", "depth", "diffraction"}),
     ],
 )
 def test_random_cameras_keep_every_tolerance(number, absent, tmp_path):
-    """Four of the forty of `make promise`: of pictures, which are quick; one moves, one has layers.
+    """Five of the forty of `make promise`: of pictures, which are quick.
+
+    Two move, one has layers, one an aperture of blades around an obscuration, which has diffraction
+    in its blur.
 
     Of a picture in laser light, which has no lamp, no lamp flickers.
     """
