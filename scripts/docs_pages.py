@@ -109,7 +109,7 @@ def _effects() -> tuple[str, dict[str, bytes]]:
     """Return the page of all effects, and their pictures by name."""
     from vcam_cli.effects.order import ORDER
 
-    pictures = {f"effects/{effect.name}.png": _effect_picture(effect.name) for effect in ORDER}
+    pictures = {f"effects/{name}.png": _effect_picture(name) for name in effect_pictures.EXAMPLES}
     lines = [
         "# Effects and their equations\n",
         "In the order in which they act. Equation numbers without another source are those of",
@@ -129,12 +129,12 @@ def _effect(effect: Any) -> Iterator[str]:
     name = effect.name
     yield f"## {name.replace('_', ' ')} {{ #{name} }}\n"
     yield _prose(effect.__doc__) + "\n"
-    shown = effect_pictures.EXAMPLES[name]
-    yield f"![Without {name.replace('_', ' ')}, and with it](../effects/{name}.png)\n"
-    yield f"{escaped(shown.shows)}\n"
-    yield '??? note "The command"\n\n    ```text'
-    yield from (f"    {line}" for line in effect_pictures.command(name).splitlines())
-    yield "    ```\n"
+    for own in effect_pictures.shown_by(name):
+        yield f"![Without {own.replace('_', ' ')}, and with it](../effects/{own}.png)\n"
+        yield f"{escaped(effect_pictures.EXAMPLES[own].shows)}\n"
+        yield '??? note "The command"\n\n    ```text'
+        yield from (f"    {line}" for line in effect_pictures.command(own).splitlines())
+        yield "    ```\n"
     module = inspect.getdoc(inspect.getmodule(effect)) or ""
     text = module.partition("\n\n")[2].split("\nReferences\n")[0]
     if text.strip():

@@ -46,6 +46,8 @@ class Example:
     camera: str = "starter"
     without: tuple[str, ...] = ()
     """What is changed instead for the photograph at the left; () where the effect is left out."""
+    of: str = ""
+    """The effect that it is a further example of; "" where it has the effect's name."""
     frames: int = 1
     """Frames of the sequence, at `FPS`; the photograph is the last."""
 
@@ -69,6 +71,20 @@ EXAMPLES = {
     "aberration": Example(
         (*_chart("eye-chart"), *GRAY, "optics.zernike={4: 0.4 um, 7: 0.3 um}"),
         "0.4 um of defocus and 0.3 um of coma.",
+    ),
+    "aperture": Example(
+        (
+            "scene.source={kind: chart, chart: point-grid, spacing: 160 um, diameter: 24 um}",
+            *GRAY,
+            "optics.defocus=110 um",
+            "optics.f_number=1.4",
+            "optics.aperture={blades: 5, obscuration: 30 %}",
+            "exposure.time=25 ms",
+        ),
+        "Out of focus by 0.11 mm, through a circle at the left and at the right through five blades"
+        " around an obscuration.",
+        without=("optics.aperture=circle",),
+        of="aberration",
     ),
     "depth": Example(
         (
@@ -267,7 +283,12 @@ EXAMPLES = {
         without=("adc.bits=14",),
     ),
 }
-"""Name of an effect -> what shows it."""
+"""Name of an effect, or of a further example -> what shows it."""
+
+
+def shown_by(effect: str) -> list[str]:
+    """Return the names of the examples of an effect, the one with its name first."""
+    return [effect, *(name for name, example in EXAMPLES.items() if example.of == effect)]
 
 
 def command(name: str) -> str:
@@ -283,8 +304,9 @@ def cameras(name: str) -> tuple[Camera, Camera]:
     from vcam_cli.simulation.checks import load
 
     example = EXAMPLES[name]
+    effect = example.of or name
     sets = (*SIZE, "quality=[]", *example.sets)
-    left, right = example.without or (f"effects.{name}=off",), (f"effects.{name}=on",)
+    left, right = example.without or (f"effects.{effect}=off",), (f"effects.{effect}=on",)
     return load(example.camera, (*sets, *left)), load(example.camera, (*sets, *right))
 
 
