@@ -121,7 +121,7 @@ def _draw_mtf(axes: Any, page: LensPage) -> None:
     axes.set_ylim(0, 1.02)
     axes.set_ylabel("MTF, equal-energy light")
     axes.set_xlabel("image height [mm]")
-    axes.legend(fontsize=SMALL, loc="best")
+    _legend_above(axes)
 
 
 def _draw_curve(axes: Any, heights: Any, values: Any, label: str) -> None:
@@ -139,4 +139,17 @@ def _draw_color(axes: Any, page: LensPage) -> None:
     primary = page.view.lens.primary * 1e9
     axes.set_ylabel(f"lateral color [um], 0 at {primary:.0f} nm")
     axes.set_xlabel("image height [mm]")
-    axes.legend(fontsize=SMALL)
+    _legend_above(axes)
+
+
+def _legend_above(axes: Any) -> None:
+    """Put the legend above a panel, where no curve passes."""
+    axes.legend(
+        fontsize=SMALL,
+        ncols=3,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        borderpad=0.2,
+        columnspacing=1.0,
+        handlelength=1.6,
+    )
