@@ -4,7 +4,7 @@ import pytest
 from driver import Driver
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def vcam():
     """vcam, run again and again without loading it anew."""
     with Driver() as driver:

@@ -1,9 +1,10 @@
 """vcam again and again: `Driver` runs it in forks of a process in which it is loaded already.
 
-`python driver.py` reads lines of JSON and answers with lines of JSON. A line is {"args": [...],
-"folder": "..."}, and may have "signal" and "after": the fork is sent the signal after so many
-seconds; and "largest": no file may grow beyond so many bytes. The answer has the exit code
-(negative for the signal it died of), what it printed, its seconds, and its peak of memory.
+`python driver.py` reads lines of JSON and answers with lines of JSON. A line is a list of commands
+that run at once: {"args": [...], "folder": "..."}, which may have "signal" and "after": the fork is
+sent the signal after so many seconds; and "largest": no file may grow beyond so many bytes. The
+answer of each has the exit code (negative for the signal it died of), what it printed, its seconds,
+and its peak of memory.
 
 Why forks: a run takes a tenth of a second, most of a process's second is the loading of libraries.
 They are loaded before the first order, and no more than that: threads that a library begins when
@@ -22,11 +23,14 @@ import sys
 import tempfile
 import time
 import traceback
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import IO, Any, Self
 
 from processes import TIMEOUT, environment
 
+MODULES = tempfile.NamedTemporaryFile(suffix=".json")  # noqa: SIM115 (as long as the process)
+"""Names of modules that the first driver of a process found, for all others."""
 HANGS = TIMEOUT / 2
 """Seconds after which a fork says where it is, and ends with exit code 1."""
 
@@ -40,7 +44,8 @@ class Driver:
     def __init__(self, *before: str) -> None:
         self._spare = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         self.process = subprocess.Popen(
-            [*before, sys.executable, __file__], env=environment({"TMPDIR": self._spare.name}),
+            [*before, sys.executable, __file__, MODULES.name],
+            env=environment({"TMPDIR": self._spare.name}),
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
         )  # fmt: skip
 
@@ -60,41 +65,49 @@ class Driver:
 
     def __call__(self, folder: Path, *args: str, **more: float) -> dict[str, Any]:
         """Runs `vcam ARGS` in a folder. more: signal, after, largest."""
-        self.begin(folder, *args, **more)
-        return self.end()
+        return self._told([{"args": args, "folder": str(folder), **more}])[0]
 
-    def begin(self, folder: Path, *args: str, **more: float) -> None:
-        """Begins to run `vcam ARGS`."""
-        order = {"args": args, "folder": str(folder), **more}
-        self.process.stdin.write(json.dumps(order) + "\n")
+    def at_once(self, folder: Path, *lines: Sequence[str]) -> list[dict[str, Any]]:
+        """Runs several `vcam ARGS` in a folder, all begun before the first has ended."""
+        return self._told([{"args": args, "folder": str(folder)} for args in lines])
+
+    def _told(self, orders: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        """What came of orders that are carried out at once."""
+        self.process.stdin.write(json.dumps(orders) + "\n")
         self.process.stdin.flush()
-
-    def end(self) -> dict[str, Any]:
-        """What came of what was begun."""
         line = self.process.stdout.readline()
         assert line, f"the driver ended: {self.process.wait(TIMEOUT)}"
         return json.loads(line)
 
 
-def answer(order: dict[str, Any]) -> dict[str, Any]:
-    """Runs one command as told, and says what came of it."""
-    with tempfile.TemporaryFile("w+") as printed:
-        start = time.monotonic()
-        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # Python's own part of a fork
-        process = os.fork()
-        if process == 0:
-            _child(order, printed.fileno())
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-        if "signal" in order:
-            time.sleep(order["after"])
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(process, order["signal"])
-        _, status, used = os.wait4(process, 0)
-        seconds = time.monotonic() - start
-        printed.seek(0)
-        said = printed.read()
+def answers(orders: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Runs commands as told, all at once, and says what came of each."""
+    with contextlib.ExitStack() as files:
+        begun = []
+        for order in orders:
+            printed = files.enter_context(tempfile.TemporaryFile("w+"))
+            start = time.monotonic()
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # Python's own part of a fork
+            process = os.fork()
+            if process == 0:
+                _child(order, printed.fileno())
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+            begun.append((order, process, start, printed))
+        return [_came_of(*each) for each in begun]
+
+
+def _came_of(order: dict[str, Any], process: int, start: float, printed: IO[str]) -> dict[str, Any]:
+    """Waits for a fork, and says what came of it."""
+    if "signal" in order:
+        time.sleep(order["after"])
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(process, order["signal"])
+    _, status, used = os.wait4(process, 0)
+    seconds = time.monotonic() - start
+    printed.seek(0)
     code = os.waitstatus_to_exitcode(status)
-    return {"code": code, "said": said, "seconds": seconds, "peak": used.ru_maxrss * 1024}
+    peak = used.ru_maxrss * 1024
+    return {"code": code, "said": printed.read(), "seconds": seconds, "peak": peak}
 
 
 def _child(order: dict[str, Any], printed: int) -> None:
@@ -145,8 +158,20 @@ keep: [raw]
 """
 
 
-def _load() -> None:
-    """Imports what a sweep imports and a run, which a fork makes to tell it."""
+def _load(file: Path) -> None:
+    """Imports what a sweep imports and a run: modules that a file names.
+
+    Where it is empty, a fork runs both to tell it.
+    """
+    if not file.stat().st_size:
+        file.write_text(json.dumps(_used()))
+    for name in json.loads(file.read_text()):
+        with contextlib.suppress(ImportError):
+            importlib.import_module(name)
+
+
+def _used() -> list[str]:
+    """Names of the modules that a sweep uses, and a run."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder)
         (path / "study.yaml").write_text(STUDY)
@@ -165,12 +190,10 @@ def _load() -> None:
             os._exit(0)
         _, status = os.waitpid(process, 0)
         assert not status, "a run or a sweep failed"
-        for name in json.loads((path / "names").read_text()):
-            with contextlib.suppress(ImportError):
-                importlib.import_module(name)
+        return json.loads((path / "names").read_text())
 
 
 if __name__ == "__main__":
-    _load()
+    _load(Path(sys.argv[1]))
     for line in sys.stdin:
-        print(json.dumps(answer(json.loads(line))), flush=True)
+        print(json.dumps(answers(json.loads(line))), flush=True)

@@ -201,12 +201,9 @@ def test_two_runs_at_once_leave_what_one_of_them_gives(vcam, folder):
     for seed in ("1", "2"):
         assert vcam(folder, *RUN, seed, "--seed", seed)["code"] == 0
         expected.append(results(folder / seed))
-    with Driver() as other:
-        for _ in range(2):
-            vcam.begin(folder, *RUN, "out", "--seed", "1")
-            other.begin(folder, *RUN, "out", "--seed", "2")
-            ends = [vcam.end(), other.end()]
-            assert sorted(end["code"] for end in ends) in ([0, 0], [0, 3]), ends
-            assert all(end["code"] == 0 or "folder in use" in end["said"] for end in ends)
-            assert set(contents(folder / "out")) == NAMES
-            assert results(folder / "out") in expected
+    for _ in range(2):
+        ends = vcam.at_once(folder, *((*RUN, "out", "--seed", seed) for seed in ("1", "2")))
+        assert sorted(end["code"] for end in ends) in ([0, 0], [0, 3]), ends
+        assert all(end["code"] == 0 or "folder in use" in end["said"] for end in ends)
+        assert set(contents(folder / "out")) == NAMES
+        assert results(folder / "out") in expected
