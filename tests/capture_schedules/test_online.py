@@ -184,6 +184,7 @@ class TestLoss:
         other = online_loss.online_losses(scene(20_000), SENSOR, [3], seed=3, runs=2)
         assert other != again
 
+    @pytest.mark.draws
     def test_is_drawn(self, rows, tmp_path):
         online_loss.plot_losses(tmp_path / "online.png", "a scene", rows)
         assert (tmp_path / "online.png").stat().st_size > 10_000

@@ -140,6 +140,7 @@ def test_mean_snr_of_one_level(tmp_path):
     assert shot.measured.snr == pytest.approx(expected, rel=5 * np.sqrt(2 / 16 / 4096))
 
 
+@pytest.mark.draws
 def test_files(found, asked, made, tmp_path):
     with OutputFolder(tmp_path / "out", "study.json") as folder:
         frames.write_frames(found, asked, folder, "made", ("svg", "pdf"))

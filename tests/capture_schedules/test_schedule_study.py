@@ -14,7 +14,6 @@ from making import tree
 from vcam_cli import load, schedule, simulate
 from vcam_cli.capture_schedules import pdf_plots, photocurrents, tables
 from vcam_cli.errors import BadInput
-from vcam_cli.files import plots
 from vcam_cli.scheduling import objective
 from vcam_cli.scheduling.pdf import Pdf
 
@@ -33,9 +32,8 @@ LIT = {"min": 200, "max": 5e4}
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch):
-    """An empty current folder; plots are left out, but where a test asks for them."""
+    """An empty current folder."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(plots, "save", lambda _, path: Path(path).write_bytes(b"png"))
     return tmp_path
 
 
@@ -529,8 +527,8 @@ def test_online():
     assert Path("out/online.csv").exists()
 
 
-def test_plots_are_the_same_bytes_for_the_same_numbers(monkeypatch, folder):
-    monkeypatch.undo()
+@pytest.mark.draws
+def test_plots_are_the_same_bytes_for_the_same_numbers(folder):
     study = STUDY | {"pdf": segments(*THREE), "segments": [1, 2], "counts": [2, 8]}
     (folder / "study.yaml").write_text(yaml.safe_dump(study))
     found = schedule(folder / "study.yaml", folder / "out")

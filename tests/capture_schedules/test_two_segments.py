@@ -91,7 +91,7 @@ density: [histogram, kernel, nearest-neighbor, penalized-likelihood]
     optimum = result.task.exact_task.optimum([4])[4].expected_snr
     values = [float(row.split(",")[3]) for row in rows[1:]]
     assert max(values) <= optimum * (1 + 1e-9)
-    assert (tmp_path / "out/charge.png").stat().st_size > 5000
+    assert (tmp_path / "out/charge.png").is_file()
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,8 @@ from vcam_cli.characterization import bench, exposures
 from vcam_cli.characterization.output import SHOWN
 from vcam_cli.commands.main import app
 
+pytestmark = pytest.mark.draws
+
 FILES = {
     "characterize.csv",
     "characterize.json",

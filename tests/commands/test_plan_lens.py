@@ -10,6 +10,7 @@ from vcam_cli.commands.main import app
 RUN = CliRunner()
 
 
+@pytest.mark.draws
 def test_the_page_and_its_table(tmp_path):
     line = ["plan", "phone-double-gauss", "--lens", "-o", str(tmp_path / "out")]
     result = RUN.invoke(app, line, prog_name="vcam")

@@ -29,7 +29,6 @@ targets: [1.7, 3]
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(plots, "save", lambda _, path: Path(path).write_bytes(b"png"))
     Path("study.yaml").write_text(STUDY, "utf-8")
     return tmp_path
 

@@ -289,6 +289,7 @@ def test_colors_of_a_mosaic_are_told_apart(taken, tmp_path):
     assert load(tmp_path / "camera.yaml").array.pattern == "bayer-rggb"
 
 
+@pytest.mark.draws
 def test_the_command_writes_camera_table_and_json(taken, tmp_path):
     folder, _, form = taken
     (folder / "bench.yaml").write_text(yaml.safe_dump(form | {"hold_out": "20 %"}))

@@ -120,6 +120,7 @@ def test_masked_pixels_see_half_the_light_and_are_filled_in_the_picture(tmp_path
     assert error.max() < 0.025 * frame.dn.max() + 1
 
 
+@pytest.mark.draws
 def test_files_of_halves(tmp_path):
     dark = {"pixel.photodetector.dark_current": "9 ke/s", "output.phase": True, "effects": "all"}
     result = simulate(camera(tmp_path, {**WAVE, **dark, "optics.defocus": "100 um"}))

@@ -43,6 +43,7 @@ def test_scenes_call_for_different_effects():
     assert states["hdr-patches, 20000 cd/m2"]["saturation"] == "on"
 
 
+@pytest.mark.draws
 def test_the_command_writes_a_table_and_a_picture(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     sets = [word for each in SMALL for word in ("--set", each)]
@@ -113,6 +114,7 @@ def test_cells_say_what_became_of_an_effect():
     assert {text: scene_plans.mark(d) for text, d in cases.items()} == {t: t for t in cases}
 
 
+@pytest.mark.draws
 def test_the_picture_colors_what_a_plan_may_skip(tmp_path):
     """The share of quantization, which is never skipped, changes nothing in it."""
     for name, is_colored in (("read_noise", True), ("quantization", False)):
@@ -120,6 +122,7 @@ def test_the_picture_colors_what_a_plan_may_skip(tmp_path):
         assert (one != more) == is_colored, name
 
 
+@pytest.mark.draws
 def test_the_picture_shows_skipped_effects_by_the_time_that_they_save(tmp_path):
     skipped = [line(state="off", saved=s, contribution=c) for s, c in ((0, 1e-3), (0, 1e-5))]
     nothing = drawn(tmp_path, skipped[0])

@@ -13,6 +13,8 @@ from vcam_cli.errors import BadInput
 from vcam_cli.files.images.images import read_picture
 from vcam_cli.sweeps import error_maps, sweep_points
 
+pytestmark = pytest.mark.draws
+
 pytestmark = pytest.mark.long
 
 CHART = {"kind": "chart", "chart": "csf", "max_frequency": "40 lp/mm"}

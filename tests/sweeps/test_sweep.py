@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +13,7 @@ from sweeping import VCAM, environment, written
 
 from vcam_cli import load, simulate, sweep
 from vcam_cli.errors import BadInput, CannotDo
-from vcam_cli.files import atomic, plots
+from vcam_cli.files import atomic
 from vcam_cli.files.points_store import SweepFolder
 from vcam_cli.sweeps import computation, point_execution, point_work, workers
 from vcam_cli.sweeps.execution import Share
@@ -27,14 +26,6 @@ LONG = {
     "optimize": OPTIMIZE,
 }
 POINTS = 24
-
-
-@pytest.fixture(scope="module", autouse=True)
-def plots_not_rendered():
-    """Rendering takes half of a small sweep; test_sweep_command.py looks at its pictures."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plots, "save", lambda _, path: Path(path).write_bytes(b"png"))
-        yield
 
 
 def tables(folder):

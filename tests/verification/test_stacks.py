@@ -133,6 +133,7 @@ def test_a_wrong_file_differs(taken, what):
     assert planted.judged(camera, planted.WRONG[what], file).summary()["differing"] > 0
 
 
+@pytest.mark.draws
 def test_the_command_ends_with_4_where_a_tolerance_is_missed(taken, tmp_path, monkeypatch):
     """Of a wrong gain: 3 % is more than 2 %, and less than 4 %."""
     _, folder, file = taken
