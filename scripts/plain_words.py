@@ -69,12 +69,12 @@ def hits() -> Iterator[tuple[Path, int, str, str]]:
     for path in files():
         if path == Path(__file__).resolve():
             continue
-        for number, line in enumerate(path.read_text("utf-8").splitlines(), 1):
-            if SKIP in line:
-                continue
-            for pattern, remedy in PHRASES.items():
-                for found in re.finditer(pattern, line, re.IGNORECASE):
-                    yield path, number, found[0], remedy
+        text = path.read_text("utf-8")
+        for pattern, remedy in PHRASES.items():
+            for found in re.finditer(pattern, text, re.IGNORECASE):
+                line = text[text.rfind("\n", 0, found.start()) + 1 :].partition("\n")[0]
+                if SKIP not in line:
+                    yield path, text.count("\n", 0, found.start()) + 1, found[0], remedy
 
 
 def main() -> int:
