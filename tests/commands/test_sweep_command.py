@@ -176,7 +176,7 @@ def test_a_full_disk_ends_with_3(monkeypatch):
 
 
 def test_ctrl_c_says_that_points_are_kept():
-    write(vary={"pixel.width": {"start": "4 um", "stop": "6 um", "count": 2000}})
+    write(vary={"pixel.width": {"start": "4 um", "stop": "6 um", "count": 300}})
     command = [sys.executable, "-m", "vcam_cli.commands.main", "sweep", "study.yaml"]
     root = str(Path(module.__file__).parents[2])
     size = ["--set", "array.rows=90", "--set", "array.columns=90"]  # so that it lasts
@@ -219,6 +219,7 @@ def test_a_log_has_a_line_a_minute(capsys, monkeypatch):
     assert all(line.startswith("sweep: 3 of 12, about ") for line in lines)
 
 
+@pytest.mark.draws
 def test_plots_are_pictures_and_the_same_bytes():
     write(cases={"a": {}, "b": {"scene.radiance": "0.2 W/(sr m2)"}}, seeds=2)
     one()

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from every import every
 from making import QUIET, camera
 
 from vcam_cli import simulate
@@ -37,23 +38,28 @@ def effect(folder, **changes) -> PixelVignetting:
     return found
 
 
-@pytest.mark.parametrize("accuracy", ["draft", "standard", "reference"])
 @pytest.mark.parametrize("field", FIELDS)
-def test_the_series_agrees_with_the_pupil(field, accuracy, tmp_path):
+def test_the_series_agrees_with_the_pupil(field, tmp_path):
     """At random places of all quadrants: half of the tolerance anywhere, a tenth of it rms."""
-    found = effect(tmp_path, **LARGE, **FIELDS[field], accuracy=accuracy)
+    finest = effect(tmp_path, **LARGE, **FIELDS[field], accuracy="reference")
     place = np.random.default_rng(3).uniform(-1, 1, (2, 40))
-    x, y = place[0] * found.half_width, place[1] * found.half_height
-    error = found.gain(x, y) - found.exact_gain(x[None, :], y[:, None])
-    assert np.abs(error).max() < found.tolerance / 2
-    assert np.sqrt(np.mean(error**2)) < found.tolerance / 10
-    # where the light does not end within the field a few 1e-5 are all there is
-    if field in ("wide open", "microlenses"):
-        assert np.abs(error).max() < 1e-4
-    rounded = found.gain(x.astype(np.float32), y.astype(np.float32))
-    assert rounded.dtype == np.float32
-    # 32-bit places are 6e-8 of the field off, sums of up to 65 terms a few 1e-6
-    np.testing.assert_allclose(rounded, found.gain(x, y), atol=1e-5)
+    x, y = place[0] * finest.half_width, place[1] * finest.half_height
+    exact = finest.exact_gain(x[None, :], y[:, None])
+
+    def check(accuracy):
+        found = effect(tmp_path, **LARGE, **FIELDS[field], accuracy=accuracy)
+        error = found.gain(x, y) - exact
+        assert np.abs(error).max() < found.tolerance / 2
+        assert np.sqrt(np.mean(error**2)) < found.tolerance / 10
+        # where the light does not end within the field a few 1e-5 are all there is
+        if field in ("wide open", "microlenses"):
+            assert np.abs(error).max() < 1e-4
+        rounded = found.gain(x.astype(np.float32), y.astype(np.float32))
+        assert rounded.dtype == np.float32
+        # 32-bit places are 6e-8 of the field off, sums of up to 65 terms a few 1e-6
+        np.testing.assert_allclose(rounded, found.gain(x, y), atol=1e-5)
+
+    every(["draft", "standard", "reference"], check)
 
 
 def test_some_corners_are_dark(tmp_path):

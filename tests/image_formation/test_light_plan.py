@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from every import every
-from making import camera, radiance_for
+from making import camera, long_except, radiance_for
 from optical_paths import of_camera, rms
 
 from vcam_cli import simulate
@@ -129,7 +129,7 @@ def _rate(tmp_path, changes, off=None) -> np.ndarray:
 LENS = {"optics.f_number": 1.4, "pixel.width": "7.7 um", "pixel.photodetector.fill_factor": 1}
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", long_except([0, 1], range(4)))
 @pytest.mark.parametrize(("samples", "pixels"), [(1, 48), (3, 16), (4, 25), (1, 15)])
 @pytest.mark.parametrize("kind", ["star", "row", "column"])
 def test_lone_light_is_seen_wherever_it_is(kind, samples, pixels, seed, tmp_path):

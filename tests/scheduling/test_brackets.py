@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from making import long_except
 
 from vcam_cli.scheduling.brackets import bracket_bound, bracket_snr, optimal_bracket
 from vcam_cli.scheduling.objective import expected_snr
@@ -48,7 +49,7 @@ def test_value_is_that_of_merged_exposures():
 
 
 @pytest.mark.parametrize("name", CASES)
-@pytest.mark.parametrize("total", [2.0, 3.7, 8.0, 40.0])
+@pytest.mark.parametrize("total", long_except([3.7, 40.0], [2.0, 3.7, 8.0, 40.0]))
 def test_no_times_of_a_fine_grid_are_better(name, total):
     """Two and three exposures, the first given: all sums of 300 times and of those at which a
     level or segment saturates. What is found lies off the grid and is at least as good."""
@@ -75,9 +76,9 @@ def test_no_times_of_a_fine_grid_are_better(name, total):
 def test_more_exposures_in_more_time_are_worth_more_and_stay_within_the_bound(name):
     pdf, sensor = CASES[name]
     t1 = first(pdf, sensor)
-    found = [optimal_bracket(pdf, n, n * 3 * t1, sensor).expected_snr for n in (1, 2, 4, 8)]
+    found = [optimal_bracket(pdf, n, n * 3 * t1, sensor).expected_snr for n in (1, 2, 4)]
     assert all(np.diff(found) > 0)
-    assert found[-1] <= bracket_bound(pdf, 24 * t1, sensor)
+    assert found[-1] <= bracket_bound(pdf, 12 * t1, sensor)
 
 
 def test_bound_is_one_exposure_that_never_saturates():
