@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import tracemalloc
 from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
@@ -27,6 +28,7 @@ from vcam_cli.files.images.png import write_png
 from vcam_cli.files.spectral.exr import write_spectral
 from vcam_cli.progress import Silent
 from vcam_cli.simulation.shared import RECENT, Shared
+from vcam_cli.sweeps import sweep_file, sweep_points
 from vcam_cli.sweeps.execution import Execution
 
 from .measure import Cost, run_cost, start_cost, take_turns
@@ -128,7 +130,24 @@ def _small_sweep(repeats: int, points: int) -> dict[str, Row]:
             return run_cost(work)
 
         one, other = take_turns(repeats, swept, looped)
-    return {"points": one.ratio(other) | {"before": 2.0}}
+
+        point = _traced(lambda: sweep_points.grid(sweep_file.read(study)).points) / points
+    alone = _traced(lambda: [load("starter", SMALL) for _ in range(10)]) / 10
+    return {
+        "points": one.ratio(other) | {"before": 2.0},
+        "memory of a point, over a camera": {"ratio": point / alone, "before": 1.0},
+    }
+
+
+def _traced(make: Callable[[], object]) -> int:
+    """Memory of what is made and kept, after it was made once before [bytes]."""
+    make()
+    tracemalloc.start()
+    made = make()
+    size = tracemalloc.get_traced_memory()[0]
+    tracemalloc.stop()
+    del made
+    return size
 
 
 def _small_frames(repeats: int, size: int, frames: int) -> Row:

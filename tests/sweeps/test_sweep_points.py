@@ -1,11 +1,17 @@
 """From a study file to its points: their order, their hashes, and what is wrong with them."""
 
 import itertools
+import pickle
+import tracemalloc
 
 import pytest
 from sweeping import written
 
+from vcam_cli import load
+from vcam_cli.accuracy_study.ablation import wanted_effects
 from vcam_cli.errors import BadInput
+from vcam_cli.files.report import hash_text
+from vcam_cli.solve.light_key import light_key
 from vcam_cli.sweeps import sweep_file, sweep_points
 
 
@@ -43,6 +49,52 @@ def test_order_is_case_then_grid_then_repeat_then_seed(tmp_path):
         assert p.camera.seed.frame == p.seed
         # 0.1 and 0.2 W/(sr m2) of the same lamp
         assert p.camera.scene.radiance == (0.2 if p.case == "a" else 0.1)
+
+
+def test_cameras_are_those_of_their_whole_files(tmp_path):
+    """Whatever order they are made in, beside cameras that are refused."""
+    vary = {
+        "pixel.width": {"values": ["4 um", "5 um"]},
+        "pixel.photodetector.fill_factor": {"values": [0.5, 2.0, 0.9]},
+        "scene.illuminant": {"values": ["D65", "A"]},
+    }
+    found = grid(tmp_path, vary=vary, repeat={"adc.bits": [8, 12]}, seeds=2)
+    valid = [point for point in found.points if point.id]
+    assert len(valid) == 2 * len(found.points) // 3
+    for point in reversed(valid):
+        values = {
+            "pixel.width": f"{point.case_values['pixel.width']} um",
+            "pixel.photodetector.fill_factor": point.case_values["pixel.photodetector.fill_factor"],
+            "scene.illuminant": point.case_values["scene.illuminant"],
+            "adc.bits": int(point.averaged_values["adc.bits"]),
+            "seed.frame": point.seed,
+            "name": point.case,
+            "quality": [],
+        }
+        sets = [f"{path}={value}" for path, value in values.items()]
+        whole = load(tmp_path / "camera.yaml", sets)
+        assert point.camera.model_dump() == whole.model_dump()
+        assert point.effects == tuple(wanted_effects(whole))
+        assert point.light == hash_text(light_key(whole))
+
+
+def test_points_hold_no_cameras(tmp_path):
+    def held(count):
+        study = sweep_file.read(
+            written(
+                tmp_path, vary={"pixel.width": {"start": "4 um", "stop": "5 um", "count": count}}
+            )
+        )
+        tracemalloc.start()
+        points = sweep_points.grid(study).points
+        size = tracemalloc.get_traced_memory()[0]
+        tracemalloc.stop()
+        return size, points
+
+    held(2)  # what a process keeps of any study
+    (few, _), (many, points) = held(20), held(120)
+    camera = len(pickle.dumps(points[0].camera.model_dump()))
+    assert (many - few) / 100 < camera
 
 
 def test_steps_of_a_range_are_exact_in_its_unit(tmp_path):

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.files.in_use import POINTS
@@ -15,7 +15,6 @@ from vcam_cli.files.points_store import SweepFolder
 from vcam_cli.files.report import hash_file
 from vcam_cli.progress import Observer
 from vcam_cli.simulation.output import provenance
-from vcam_cli.solve.light_key import light_key
 from vcam_cli.sweeps import (
     expectations,
     figures,
@@ -34,7 +33,7 @@ from vcam_cli.sweeps.point_execution import (
 from vcam_cli.sweeps.point_work import Job, Task
 from vcam_cli.sweeps.study_cameras import StudyCameras
 from vcam_cli.sweeps.sweep_file import StudyFile
-from vcam_cli.sweeps.sweep_points import LIBRARIES, Grid
+from vcam_cli.sweeps.sweep_points import LIBRARIES, Grid, Point
 from vcam_cli.sweeps.sweep_result import (
     FRAMES,
     Extras,
@@ -43,7 +42,7 @@ from vcam_cli.sweeps.sweep_result import (
     read_outcome,
 )
 from vcam_cli.sweeps.sweep_tables import Findings
-from vcam_cli.sweeps.workers import Groups, Verdict
+from vcam_cli.sweeps.workers import Verdict
 
 
 def computed_sweep(
@@ -110,7 +109,7 @@ class _Points:
         self._device = execution.device
         model = grid.study.model
         self._frames = tuple(FRAMES[what] for what in model.keep)
-        self._points = {p.id: p for p in grid.points if p.camera is not None}
+        self._points = {p.id: p for p in grid.points if p.id}
         self._metrics, self._keep = model.metrics, model.keep
 
     def read_finished(self) -> None:
@@ -142,24 +141,19 @@ class _Points:
         """Whether all outcomes are known, and none would be another one at another time."""
         return all(p in self.outcomes and self.outcomes[p].final for p in self._points)
 
-    def groups(self) -> list[list[Job]]:
+    def groups(self) -> list[list[Point]]:
         """Return all points in the study's order, those of the same light together."""
-        lights: dict[str, str] = {}
-        groups: dict[str, list[Job]] = {}
+        groups: dict[str, list[Point]] = {}
         for point in self._points.values():
-            camera = point.camera
-            assert camera is not None
-            if point.content not in lights:
-                lights[point.content] = light_key(camera)
-            bare, wanted = _without_texts(camera), (self._metrics, self._keep)
-            job = Job(point.id, bare, *wanted, self._versions, self._device)
-            groups.setdefault(lights[point.content], []).append(job)
+            groups.setdefault(point.light, []).append(point)
         return list(groups.values())
 
-    def unfinished_points(self, groups: Groups) -> list[list[Task]]:
-        """Return the points of these groups that are not finished."""
+    def unfinished_jobs(self, groups: Sequence[Sequence[Point]]) -> list[_Jobs]:
+        """Return the points of these groups that are not finished, to be computed."""
         final = {point for point, outcome in self.outcomes.items() if outcome.final}
-        return [[job for job in group if job.id not in final] for group in groups]
+        given = self._metrics, self._keep, self._versions, self._device
+        left = ([point for point in group if point.id not in final] for group in groups)
+        return [_Jobs(points, *given) for points in left]
 
     def ask(self, job: Task) -> Verdict:
         """Return whether a point is still to be computed, and claim it then."""
@@ -168,6 +162,33 @@ class _Points:
     def keep(self, outcome: Outcome) -> None:
         """Keep the outcome of a point; one that cannot be kept ends with an error."""
         self.outcomes[outcome.id] = keep_outcome(self._folder, outcome, self._versions["code"])
+
+
+@dataclass(frozen=True)
+class _Jobs(Sequence[Job]):
+    """Points to compute; each has its camera made when it is read."""
+
+    points: Sequence[Point]
+    metrics: tuple[str, ...]
+    keep: tuple[str, ...]
+    versions: dict[str, str]
+    device: str
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    @overload
+    def __getitem__(self, index: int) -> Job: ...
+    @overload
+    def __getitem__(self, index: slice) -> _Jobs: ...
+    def __getitem__(self, index: int | slice) -> Job | _Jobs:
+        if isinstance(index, slice):
+            return replace(self, points=self.points[index])
+        point = self.points[index]
+        camera = point.camera
+        assert camera is not None
+        asked = self.metrics, self.keep, self.versions, self.device
+        return Job(point.id, _without_texts(camera), *asked)
 
 
 def _changes(former: Any, versions: dict[str, str]) -> str:
@@ -191,7 +212,7 @@ def _compute(
     points: _Points, execution: Execution, watch: Observer, tell: Callable[[str], None]
 ) -> int:
     """Compute the missing points of a share, and return the number of points computed."""
-    groups = points.unfinished_points(groups_of_share(points.groups(), execution.share))
+    groups = points.unfinished_jobs(groups_of_share(points.groups(), execution.share))
     return compute(groups, points, execution, watch, tell)
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 
-from vcam_cli.accuracy_study.ablation import wanted_effects, with_effects
+from vcam_cli.accuracy_study.ablation import with_effects
 from vcam_cli.camera.camera import Camera
 from vcam_cli.effects.order import ORDER
 from vcam_cli.sweeps.sweep_points import Point
@@ -29,8 +29,8 @@ def effect_differences(points: Iterable[Point]) -> str:
 
     Such as a noise that the study varies from nothing, or what a case switches off.
     """
-    cameras = {p.content: p.camera for p in points if p.camera is not None}
-    counts = Counter(name for camera in cameras.values() for name in wanted_effects(camera))
+    cameras = {p.content: p.effects for p in points if p.id}
+    counts = Counter(name for names in cameras.values() for name in names)
     some = [kind.name for kind in ORDER if 0 < counts[kind.name] < len(cameras)]
     if not some:
         return ""

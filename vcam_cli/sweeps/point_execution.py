@@ -6,10 +6,10 @@ Finished points are kept at once, so that an interrupted study continues.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 from vcam_cli.errors import BadInput
 from vcam_cli.files.points_store import SweepFolder
@@ -19,6 +19,8 @@ from vcam_cli.sweeps.execution import Execution, Share
 from vcam_cli.sweeps.point_work import Task
 from vcam_cli.sweeps.sweep_result import Outcome, error_cell
 from vcam_cli.sweeps.workers import Groups, Verdict
+
+Item = TypeVar("Item")
 
 
 class Points(Protocol):
@@ -54,7 +56,9 @@ def keep_outcome(folder: SweepFolder, outcome: Outcome, code: str) -> Outcome:
     return replace(outcome, frames={})
 
 
-def groups_of_share(groups: Groups, share: Share | None) -> Groups:
+def groups_of_share(
+    groups: Sequence[Sequence[Item]], share: Share | None
+) -> Sequence[Sequence[Item]]:
     """Return the groups of a share: whole groups where there are enough, parts of them otherwise.
 
     They depend on the study alone: a point that is finished keeps its place.

@@ -14,16 +14,18 @@ from __future__ import annotations
 import itertools
 import json
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+from vcam_cli.accuracy_study.ablation import wanted_effects
 from vcam_cli.camera import load as cameras
 from vcam_cli.camera import step_plugins
 from vcam_cli.camera.camera import FILE_KEYS, Camera
 from vcam_cli.camera.expectations import unmeasured
 from vcam_cli.camera.load import merge
+from vcam_cli.camera.sections import with_sections
 from vcam_cli.camera.simulation import Seed
 from vcam_cli.config.document import Document
 from vcam_cli.config.file_format import names_file
@@ -34,6 +36,7 @@ from vcam_cli.errors import BadInput, Problem, split
 from vcam_cli.files.report import hash_file, hash_text, to_json
 from vcam_cli.simulation.checks import CHECKS
 from vcam_cli.simulation.output import provenance
+from vcam_cli.solve.light_key import light_key
 from vcam_cli.sweeps.model import Sweep, overlap
 from vcam_cli.sweeps.sweep_file import Cell, Parameter, StudyCase, StudyFile
 
@@ -44,7 +47,10 @@ LIBRARIES = ("vcam", "code", "numpy", "scipy", "OpenImageIO")
 
 @dataclass(frozen=True)
 class Point:
-    """One frame of the study."""
+    """One frame of the study, without its camera, which is made when it is needed.
+
+    A study of a million points has none of them in memory.
+    """
 
     case: str
     case_values: dict[str, Cell]
@@ -53,16 +59,66 @@ class Point:
     """Path of what is averaged over -> its value here."""
     seed: int | None
     """The seed of the frame; None where the camera is refused."""
-    camera: Camera | None
-    """The camera; None where it is refused."""
     id: str
     """The hash of the point; "" where the camera is refused."""
     content: str = ""
     """The hash of all but the seed, the same for all seeds of a camera."""
+    light: str = ""
+    """The hash of what its light depends on; "" where the camera is refused."""
+    effects: tuple[str, ...] = ()
+    """Names of the effects that the camera has and does not switch off."""
     problems: tuple[Problem, ...] = ()
     """Why the camera is refused."""
     inputs: tuple[Path, ...] = ()
-    """The files of a camera that is refused."""
+    """The files of the camera."""
+    made: tuple[CaseCameras, tuple[int, ...], int] | None = field(
+        default=None, repr=False, compare=False
+    )
+    """What makes the camera, the numbers of the values, and by how much the seed is raised."""
+
+    @property
+    def camera(self) -> Camera | None:
+        """The camera, made anew; None where it is refused."""
+        if self.made is None:
+            return None
+        cameras, chosen, number = self.made
+        return with_next_seed(cameras.camera(chosen), number)
+
+
+class CaseCameras:
+    """Makes the cameras of a case, each checked as by itself.
+
+    What a camera has in common with the one before is not validated again.
+    """
+
+    def __init__(self, case: StudyCase, over: Node, parameters: Sequence[Parameter]) -> None:
+        self._case, self._over, self._parameters = case, over, parameters
+        self._last: tuple[dict[str, Node], Camera] | None = None
+
+    def camera(self, chosen: tuple[int, ...]) -> Camera:
+        """Return the camera with these of the parameters' values. Raises BadInput."""
+        nodes = self._nodes(chosen)
+        file = case_file(self._case, nodes, self._over)
+        found = None
+        if self._last is not None:
+            last, camera = self._last
+            differ = {str(split(path)[0]) for path in nodes if nodes[path] is not last[path]}
+            found = with_sections(camera, file, differ, CHECKS)
+        if found is None:
+            found = file.validate(CHECKS)
+        self._last = nodes, found
+        return found.model_copy(update={"name": self._case.name.replace("/", "-")})
+
+    def inputs(self, chosen: tuple[int, ...]) -> tuple[Path, ...]:
+        """Return the files of a camera that is refused."""
+        try:
+            return case_file(self._case, self._nodes(chosen), self._over).inputs
+        except BadInput:
+            return self._case.base.inputs
+
+    def _nodes(self, chosen: tuple[int, ...]) -> dict[str, Node]:
+        pairs = zip(self._parameters, chosen, strict=True)
+        return {parameter.path: parameter.nodes[number] for parameter, number in pairs}
 
 
 @dataclass(frozen=True)
@@ -124,7 +180,7 @@ def grid(
     nameless = [p for p in found.problems if p.message.startswith(NO_SUCH_KEY)]
     if nameless:
         raise BadInput(nameless)
-    if all(point.camera is None for point in points):
+    if not any(point.id for point in points):
         raise BadInput(found.problems)
     return found
 
@@ -172,32 +228,38 @@ def _points(
 ) -> Iterator[Point]:
     """Yield the points of a case, in their order."""
     parameters = [*case.parameters.values(), *repeated.values()]
+    made = CaseCameras(case, over, parameters)
+    files: dict[tuple[Path, ...], tuple[Path, ...]] = {}
     for chosen in itertools.product(*(range(len(p.nodes)) for p in parameters)):
-        nodes = {p.path: p.nodes[i] for p, i in zip(parameters, chosen, strict=True)}
         cells = {p.path: p.cells[i] for p, i in zip(parameters, chosen, strict=True)}
-        here = Point(
-            case.name,
-            {path: cells[path] for path in case.parameters},
-            {path: cells[path] for path in repeated},
-            None,
-            None,
-            "",
-        )
-        file = case.base
+        own = {path: cells[path] for path in case.parameters}
+        here = Point(case.name, own, {path: cells[path] for path in repeated}, None, "")
         try:
-            file = case_file(case, nodes, over)
-            camera = file.validate(CHECKS)
+            camera = made.camera(chosen)
             _require_metrics(camera, model)
         except BadInput as error:
-            refused = replace(here, problems=error.problems, inputs=file.inputs)
+            refused = replace(here, problems=error.problems, inputs=made.inputs(chosen))
             yield from itertools.repeat(refused, model.seeds)
             continue
-        camera = camera.model_copy(update={"name": case.name.replace("/", "-")})
-        content = _content(camera, model, device)
+        if camera.files not in files:
+            files[camera.files] = (*camera.files, *provenance.data_files(camera))
+        here = replace(
+            here,
+            content=_content(camera, model, device),
+            light=hash_text(light_key(camera)),
+            effects=_same(tuple(wanted_effects(camera))),
+            inputs=files[camera.files],
+        )
         for i in range(model.seeds):
-            own = with_next_seed(camera, i)
-            point = hash_text(f"{content} {own.seed.frame}")[:32]
-            yield replace(here, seed=own.seed.frame, camera=own, id=point, content=content)
+            seed = camera.seed.frame + i
+            point = hash_text(f"{here.content} {seed}")[:32]
+            yield replace(here, seed=seed, id=point, made=(made, chosen, i))
+
+
+@cache
+def _same(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return one tuple for all that are equal: a sweep has millions of them."""
+    return names
 
 
 def _require_metrics(camera: Camera, model: Sweep) -> None:
@@ -280,12 +342,5 @@ def _versions() -> dict[str, str]:
 
 
 def _inputs(study: StudyFile, points: Sequence[Point]) -> tuple[Path, ...]:
-    files = {study.file}
-    seen: set[tuple[Path, ...]] = set()
-    for point in points:
-        if point.camera is None:
-            files.update(point.inputs)
-        elif point.camera.files not in seen:
-            seen.add(point.camera.files)
-            files |= {*point.camera.files, *provenance.data_files(point.camera)}
-    return tuple(sorted(files))
+    found = {point.inputs for point in points}
+    return tuple(sorted({study.file}.union(*found)))

@@ -68,7 +68,7 @@ class JobQueue:
     def __init__(self, groups: Groups, ask: Ask) -> None:
         self._groups = deque(group for group in groups if group)
         self._ask = ask
-        self._own: dict[int, deque[Task]] = {}
+        self._own: dict[int, _Rest] = {}
         self._claimed: deque[Task] = deque()
         self._size = 1
 
@@ -99,17 +99,31 @@ class JobQueue:
     def _candidates(self, worker: int) -> Iterator[Task]:
         claimed = len(self._claimed)
         while group := self._group(worker):
-            yield group.popleft()
+            yield group.next()
         for _ in range(claimed):
             yield self._claimed.popleft()
 
-    def _group(self, worker: int) -> deque[Task]:
+    def _group(self, worker: int) -> _Rest:
         """Return the group of a worker; where none is left, the longest of the others to share."""
         if not self._own.get(worker):
-            longest = max(self._own.values(), key=len, default=deque())
-            # Its points are made when it begins: a data set has millions of frames.
-            self._own[worker] = deque(self._groups.popleft()) if self._groups else longest
+            longest = max(self._own.values(), key=len, default=_Rest(()))
+            self._own[worker] = _Rest(self._groups.popleft()) if self._groups else longest
         return self._own[worker]
+
+
+class _Rest:
+    """What is left of a group. A point is made when it is taken: a study has millions of them."""
+
+    def __init__(self, group: Sequence[Task]) -> None:
+        self._group, self._taken = group, 0
+
+    def __len__(self) -> int:
+        return len(self._group) - self._taken
+
+    def next(self) -> Task:
+        """Return the next point."""
+        self._taken += 1
+        return self._group[self._taken - 1]
 
 
 def compute_here(groups: Groups, ask: Ask, threads: int) -> Iterator[Outcome]:
