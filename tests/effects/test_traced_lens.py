@@ -21,6 +21,7 @@ from vcam_cli.lenses.fields import View
 from vcam_cli.lenses.files import shipped_lens
 from vcam_cli.lenses.wavefronts import ORDER, trace_field
 from vcam_cli.physics.shaped_pupil import tensor
+from vcam_cli.simulation.simulate import prepare
 
 PHONE = "phone-double-gauss"
 FULL_SIZE = "optics.prescription={use: double-gauss, scale: 1, image_plane: file}"
@@ -164,6 +165,29 @@ def test_mistakes_are_said_with_a_remedy(change, said):
         checked(PHONE, [change])
     assert said in str(error.value)
     assert "optics" in str(error.value)
+
+
+def test_failing_rays_are_counted_with_their_field():
+    """The share is that of random rays through the stop of the Topogon, opened too far."""
+    lens = "optics.prescription={use: topogon, scale: 0.091, f_number: 2.8}"
+    model = camera(lens, "optics.diffraction=false", "array={rows: 24, columns: 32}")
+    model = model.with_({"pixel.width": "75 um"})
+    blur = blur_of(model)
+    height, lost = blur.failing[-1]
+    assert height == pytest.approx(blur.half_diagonal)
+    rng = np.random.default_rng(1)
+    radius, azimuth = np.sqrt(rng.random(4000)), 2 * np.pi * rng.random(4000)
+    angle = blur.view.angle_of(np.array([height]))
+    waves = np.array([500e-9])
+    u, v = blur.view.aim(angle, waves, radius * np.cos(azimuth), radius * np.sin(azimuth))
+    chief = blur.view.chief(angle, waves)
+    front = blur.view.wavefront(angle, waves, u, v, chief)
+    alive = front.alive & np.isfinite(front.path)
+    assert lost == pytest.approx(1 - alive.mean(), abs=5 * math.sqrt(lost / 4000) + 0.02)
+    notes = prepare(model)[1]
+    [said] = [note for note in notes if "rays through the stop fail" in note]
+    assert f"{100 * lost:.2g} % of the rays" in said
+    assert f"{height * 1e3:.4g} mm off axis" in said
 
 
 @pytest.mark.long

@@ -244,7 +244,7 @@ def trace_field(
         np.quantile(lands[:, :-1], 0.9, axis=2),
         (view.heights(angles, wavelengths) - heights[:, None]),
         left,
-        1 - alive.mean(axis=(1, 2)),
+        1 - alive.mean(axis=1) @ (weight / weight.sum()),
     )
 
 
