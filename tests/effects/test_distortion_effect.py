@@ -5,7 +5,7 @@ import struct
 
 import numpy as np
 import pytest
-from making import QUIET, camera, radiance_for
+from making import GONE, QUIET, camera, radiance_for
 from moving_waves import COLUMNS, IMAGE, PITCH, ROWS
 
 from vcam_cli import load, plan, simulate
@@ -221,3 +221,101 @@ def test_raw_dng_says_how_to_undo_it(tmp_path):
     written = dng_opcodes.warp_rectilinear(found)
     assert struct.unpack(">6L", written[:24]) == (1, 1, 0x01030000, 1, 4 + 6 * 8 + 16, 1)
     assert struct.unpack(">8d", written[24:]) == (*found[0], 0.5, 0.5)
+
+
+WEDGE = {
+    "scene.source": {"kind": "chart", "chart": "step-wedge"},
+    "array": {"rows": 120, "columns": 160, "pattern": "monochrome"},
+    "effects": "auto",
+}
+CORNER = 100
+"""Pixels from the center of that array."""
+DAYLIGHT = {
+    "scene.radiance": GONE,
+    "scene.illuminant": "D65",
+    "scene.luminance": "1000 cd/m2",
+    "scene.wavelengths": {"start": "400 nm", "stop": "700 nm"},
+}
+
+
+def in_plan(folder, changes: dict, name: str) -> dict:
+    """What the plan says of an effect."""
+    return next(e for e in plan(camera(folder, changes)).effects if e["name"] == name)
+
+
+def change_by(folder, changes: dict, name: str) -> float:
+    """Rms change of the mean signal by leaving an effect out, over full signal."""
+    frames = [
+        simulate(camera(folder, changes | {"effects": QUIET | {name: state}, "accuracy": "0.02 %"}))
+        for state in ("on", "off")
+    ]
+    with_it, without = (frame.mean_electrons.astype(float) for frame in frames)
+    return float(np.sqrt(np.mean((with_it - without) ** 2)) / with_it.max())
+
+
+def test_a_hundredth_of_a_pixel_is_left_out_by_a_bound(tmp_path):
+    k1 = -0.01 / CORNER * (FOCAL / CORNER) ** 2
+    changes = POINTS | WEDGE | {"optics.distortion": {"k1": k1}}
+    found = in_plan(tmp_path, changes, "distortion")
+    assert "by up to 0.01 pixels" in found["reason"]
+    assert found["state"] == "off"
+    changed = change_by(tmp_path, changes, "distortion")
+    assert 1e-5 < changed <= found["contribution"] <= 0.0025
+    exact = in_plan(tmp_path, changes | {"accuracy": "reference"}, "distortion")
+    assert exact["state"] == "on"
+
+
+def test_a_tenth_of_a_pixel_of_lateral_color_is_left_out_before_gray(tmp_path):
+    percent = 0.05 / CORNER * 100
+    table = {"table": {450: f"{-percent} %", 550: "0 %", 650: f"{percent} %"}}
+    changes = POINTS | WEDGE | DAYLIGHT | {"optics.lateral_color": table}
+    for pattern in ("monochrome", "bayer-rggb"):
+        own = changes | {"array.pattern": pattern}
+        found = in_plan(tmp_path, own, "lateral_color")
+        assert "up to 0.1 pixels apart" in found["reason"]
+        assert found["state"] == "off"
+        changed = change_by(tmp_path, own, "lateral_color")
+        assert 1e-5 < changed <= found["contribution"] <= 0.0025
+    exact = in_plan(tmp_path, changes | {"accuracy": "reference"}, "lateral_color")
+    assert exact["state"] == "on"
+
+
+def test_the_ideal_picture_of_data_sets_is_distorted_as_the_raw_frame_is(tmp_path):
+    """A slow wave, by the place in the scene that the camera's k1 images to each pixel."""
+    frequency = 5e3
+    wave = {"kind": "chart", "chart": "sinusoid", "frequency": "5 lp/mm", "contrast": 1}
+    lens = {"optics.distortion": {"k1": -25}, "optics.lateral_color": {"table": {500: "1 %"}}}
+    frame = simulate(camera(tmp_path, POINTS | lens | {"scene.source": wave})).frame
+    x, y = np.meshgrid(np.arange(COLUMNS) - (COLUMNS - 1) / 2, np.arange(ROWS) - (ROWS - 1) / 2)
+    seen = there = x + 1j * y
+    for _ in range(60):
+        there = there + seen - k1(there)
+    light = (1 + np.cos(2 * np.pi * frequency * PITCH * there.real)) / 2
+    white = frame.white_dn[0] - frame.black_dn
+    ideal = (frame.ideal_dn()[0] - frame.black_dn) / white
+    assert np.abs(ideal - light).max() < 2e-3
+    raw = frame.mean_electrons / (frame.white_rate[0] * frame.exposure_time)
+    assert np.abs(raw - light).max() < 0.03  # which pixels blur; undistorted they are 0.1 apart
+    assert np.ptp(frame.depth()) == 0  # along the axis
+
+
+def test_raw_dng_corrects_each_color(tmp_path):
+    """WarpRectilinear has a plane for each color: its magnification is that of its light."""
+    from vcam_cli.simulation.output.raw_dng import _warp
+
+    table = {"table": {450: "-1 %", 550: "0 %", 650: "1 %"}}
+    lens = {"optics.distortion": {"k1": -25}, "optics.lateral_color": table}
+    color = DAYLIGHT | {
+        "array.pattern": "bayer-rggb",
+        "pixel.photodetector.quantum_efficiency": 0.5,
+    }
+    frame = simulate(camera(tmp_path, POINTS | color | lens)).frame
+    found = _warp(frame)
+    corner = math.hypot(ROWS, COLUMNS) / 2 / FOCAL
+    light = frame.transfer.weights.sum(axis=0)
+    means = light @ frame.transfer.wavelengths / light.sum(axis=1) * 1e9
+    change = np.interp(means, [450, 550, 650], [-0.01, 0, 0.01])
+    order = [frame.mosaic.colors.index(name) for name in "RGB"]
+    np.testing.assert_allclose(found[:, 0], 1 + change[order], atol=1e-4)
+    assert found[0, 0] > found[1, 0] > found[2, 0]
+    np.testing.assert_allclose(found[:, 1], -25 * corner**2 * found[:, 0], rtol=1e-3)
