@@ -33,8 +33,8 @@ from reference_light import Aberrated, Wavefront
 
 from vcam_cli.camera.camera import Camera
 
-FEWEST, PAIRS, RAYS = 300, 600, 9600
-"""Points of the pupil: at first, at most of pairs, at most of rays."""
+PAIRS, RAYS = (150, 600), (300, 9600)
+"""Points of the pupil at first and at most: of pairs, of rays."""
 GOAL = 2e-4
 """Of full signal, rms: what may be left, the reference tolerance. So a reference is judged by twice
 its own only, but for maps of depth; the others by a twenty-fifth more."""
@@ -71,25 +71,27 @@ def mean_electrons(frame: Frame, camera: Camera, own: Setup) -> Truth:
     own = replace(own, distance=focus(camera))
     if camera.scene.source.kind == "layers":
         flats = [flat(frame, camera, own, number) for number in range(len(_layers(camera)))]
-        one, most = (pair_sum, PAIRS) if camera.optics.diffraction else (ray_sum, RAYS)
-        return converge(lambda count: one(own, flats, count), most)
-    return converge(_of_map(frame, camera, own), RAYS)
+        one, points = (pair_sum, PAIRS) if camera.optics.diffraction else (ray_sum, RAYS)
+        return converge(lambda count: one(own, flats, count), *points)
+    return converge(_of_map(frame, camera, own), *RAYS)
 
 
-def converge(summed: Callable[[int], np.ndarray], most: int) -> Truth:
+def converge(summed: Callable[[int], np.ndarray], fewest: int, most: int) -> Truth:
     """A sum over points of the pupil, twice as many until they are enough.
 
     What is left falls as the number of points and is half of what the last doubling changes; all
-    of that is stated.
+    of that is stated, or half of what the one before changed, if more: of one doubling alone 300
+    and 600 rays before a moving layer agreed to 0.014 % and erred by 0.064 %.
     """
-    count, last = FEWEST, summed(FEWEST)
+    count, last, before = fewest, summed(fewest), math.inf
     while True:
         count *= 2
         here = summed(count)
-        left = float(np.sqrt(np.mean((here - last) ** 2)) / here.max())
+        change = float(np.sqrt(np.mean((here - last) ** 2)) / here.max())
+        left = max(change, before / 2)
         if left <= GOAL or count >= most:
             return Truth(here, left)
-        last = here
+        last, before = here, change
 
 
 def focus(camera: Camera) -> float:

@@ -24,7 +24,7 @@ from vcam_cli import simulate
 ACCURACIES = {"2 %": 0.02, "0.5 %": 0.005, "0.1 %": 0.001}
 """From loose to tight."""
 SEEDS = range(60100, 60120)
-TRUTH = {"GOAL": 5e-5, "RAYS": 19200}
+TRUTH = {"GOAL": 5e-5, "RAYS": (300, 19200)}
 """What may be left of the truth's error, of full signal, and points of the pupil at most."""
 COUNTED = 0.05
 """Errors below this part of the tolerance, or below the truth's own, say nothing of predictions."""
