@@ -86,6 +86,7 @@ def test_covariance_of_stripes_is_that_of_their_waves():
     is cos(k (r - s) u) / 8.
     """
     n, r, s, reach = 256, 40.0, -24.0, 64
+    inner = n - 2 * reach
     k = 2 * np.pi / 32
     wave = np.broadcast_to((1 + np.cos(k * np.arange(n))) / 2, (n, n))
     front = RayLayer(np.stack([np.zeros((n, n)), wave]), (r, 0.0))
@@ -95,7 +96,12 @@ def test_covariance_of_stripes_is_that_of_their_waves():
         ((own, light, cover),) = sums
         return light / len(own), cover[:, None] / len(own)
 
-    found = covariance([front, back], [rays(4000, 0)], (reach, reach), means)[0].mean()
+    def met(at):
+        top, left = (reach + int(np.floor(offset)) for offset in at[::-1])
+        return slice(top, top + inner), slice(left, left + inner)
+
+    rays_of_one = [rays(4000, 0)]
+    found = covariance([front, back], rays_of_one, (inner, inner), met, means)[0].mean()
     u = rays(60_000, 1)[:, 0]
     mean = [np.cos(k * radius * u).mean() for radius in (r - s, r, s)]
     assert found == pytest.approx(-(mean[0] - mean[1] * mean[2]) / 8, abs=2e-4)
@@ -178,6 +184,25 @@ def test_waves_diffract_from_rays_between_pairs_of_points(period, angle, rings, 
     expected = np.broadcast_to(expected if angle == 0 else expected[:, None], (16, 16))
     np.testing.assert_allclose(light[0, 0], expected, atol=error)
     np.testing.assert_allclose(cover[0, 0], expected, atol=error)
+
+
+@pytest.mark.parametrize("divided", [(1.0, 1.0), (0.6, 1.0), (0.3, 0.85)])
+@pytest.mark.parametrize("offset", [(0.0, 0.0), (0.4, 2.7), (-3.3, 5.1), (1.6, -4.9)])
+def test_rays_meet_the_cells_that_they_lie_in(divided, offset):
+    """Cells divide photodetectors, or whole pixels: also where gaps lie between them."""
+    g, count = sensor(16, 16), 3
+    cells = Cells(g, Window(slice(2, 7), slice(5, 9)), count, 0, (10, 10), divided=divided)
+    indices = cells.met(np.array(offset))
+    for axis, (pixels, index) in enumerate(zip(((5, 9), (2, 7)), indices[::-1], strict=True)):
+        edges, side = cells.edges()[axis], cells.sides[axis]
+        middle = (np.arange(*pixels) - 7.5) * PIXEL_PITCH
+        first = middle - PIXEL_PITCH * divided[axis] / 2
+        place = (first[:, None] + (np.arange(count) + offset[axis]) * side).ravel()
+        index = np.arange(len(edges) - 1)[index].ravel()
+        rounding = 1e-6 * PIXEL_PITCH
+        assert (edges[index] <= place + rounding).all()
+        assert (place < edges[index + 1] + rounding).all()
+        assert len(edges) == (len(middle) + 20) * (count + (divided[axis] < 1)) + 1
 
 
 def mesh_before_mesh(period: float, front: float, back: float) -> Scene:

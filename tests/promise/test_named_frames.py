@@ -20,6 +20,8 @@ import pytest
         ("moved", "100024"),  # 2.9 T: coarse samples of a spread ring beyond their grid
         ("moved", "200218"),  # lobes of coarse samples below zero: light is clipped there
         ("moved", "100068"),  # 1.1 T: their transfer ends with a jump, not along a table
+        ("layers", "100008"),  # 1.5 T: halves and thirds of a pixel, gaps among them, agreed
+        ("layers", "100039"),  # 1.02 T: of 20 pixels two sums differed by little
     ],
 )
 def test_a_frame_keeps_every_tolerance(kind, name, tmp_path):

@@ -49,6 +49,8 @@ Planes = tuple[Array, Array]
 """Light times opacity (C, h, w), and opacity (h, w) or (C, h, w)."""
 Sums = tuple[Array, Array, Array]
 """Rays (k, 5), and the sums over them of images of light (n, C, h, w) and of opacity (m, h, w)."""
+Met = Callable[[Array], tuple[slice, slice] | tuple[Array, Array]]
+"""What gives the rows and columns of cells that are met at an offset (x, y) [cells]."""
 Seen = Callable[[Iterable[Sums]], tuple[Array, Array]]
 """What makes of groups of rays the means over all of them in every color at the pixels:
 (n, C, rows, columns) and (m, C, rows, columns)."""
@@ -86,7 +88,7 @@ class RayLayer:
         return RayLayer(cell_means(self.planes, count), radius, path, place)
 
     def offsets(self, rays: Array) -> Array:
-        """Return the offset of the cell at which each ray meets the layer from the ray's own cell.
+        """Return how far from the beginning of its own cell each ray meets the layer.
 
         Parameters
         ----------
@@ -99,8 +101,7 @@ class RayLayer:
             Offsets (n, 2) right and down [cells].
         """
         u, t, within = rays[:, :2], rays[:, 2:3] - 0.5, rays[:, 3:]
-        met = within + u * self.radius - t * self.path - self.place
-        return np.floor(met).astype(int)
+        return np.asarray(within + u * self.radius - t * self.path - self.place)
 
 
 def rays(count: int, kind: int, opening: Opening = CIRCLE) -> Array:
@@ -160,7 +161,8 @@ def front_to_back(layers: Sequence[Planes]) -> Array:
 def covariance(
     layers: Sequence[RayLayer],
     groups: Sequence[Array],
-    reach: tuple[int, int],
+    inner: tuple[int, int],
+    met: Met,
     seen: Seen,
 ) -> Array:
     """Return what the product of the layers' means lacks, at the pixels.
@@ -171,8 +173,10 @@ def covariance(
         Layers on cells of one shape, the nearest first.
     groups : sequence of Array
         Rays (k, 5), in groups whose light is kept apart.
-    reach : tuple of int
-        Rows and columns of cells at each border that only rays from elsewhere meet.
+    inner : tuple of int
+        Rows and columns of cells that have rays.
+    met : callable
+        What gives, of a ray's offset (x, y) in cells, the cells at which it meets a layer.
     seen : callable
         What lens, silicon and photodetectors make of images on the inner cells.
 
@@ -181,9 +185,7 @@ def covariance(
     Array
         Light (C, rows, columns) at the pixels, in the unit of the layers.
     """
-    colors, *shape = layers[0].planes.shape
-    colors -= 1
-    rows, columns = (n - 2 * around for n, around in zip(shape, reach, strict=True))
+    colors, (rows, columns) = len(layers[0].planes) - 1, inner
     dtype = layers[0].planes.dtype
 
     def summed(rays: Array) -> Sums:
@@ -191,15 +193,14 @@ def covariance(
         light = np.zeros((len(layers) + 1, colors, rows, columns), dtype)  # of all, and of each
         cover = np.zeros((len(layers) - 1, rows, columns), dtype)
         for number in range(len(rays)):
-            met = []
+            parts = []
             for layer, own in zip(layers, offsets, strict=True):
-                top, left = reach[0] + own[number, 1], reach[1] + own[number, 0]
-                part = layer.planes[:, top : top + rows, left : left + columns]
-                met.append((part[:-1], part[-1]))
-            light[0] += front_to_back(met)
-            for sums, (own_light, _) in zip(light[1:], met, strict=True):
+                part = layer.planes[(slice(None), *met(own[number]))]
+                parts.append((part[:-1], part[-1]))
+            light[0] += front_to_back(parts)
+            for sums, (own_light, _) in zip(light[1:], parts, strict=True):
                 sums += own_light
-            for sums, (_, opacity) in zip(cover, met[:-1], strict=True):
+            for sums, (_, opacity) in zip(cover, parts[:-1], strict=True):
                 sums += opacity
         return rays, light, cover
 
