@@ -134,7 +134,7 @@ def make(
     known = {name: min(c * signal.time / signal.full_signal, 1.0) for name, c in changes.items()}
     left_out = {effect.name: light.shares[effect.name] for effect in light.omitted}
     shares = light.shares | known | left_out
-    variances = _SceneVariances(present, signal, tolerance)
+    variances = _SceneVariances(present, with_lower_levels(signal, tolerance), tolerance)
     omitted = {*light.omitted, *_negligible(effects, variances, light, shares)}
     on = tuple(effect for effect in present if effect not in omitted)
     active, idle = _without_idle_draws(effects, on, variances)
@@ -142,6 +142,17 @@ def make(
     decisions = [_decide(kind, effects, light, omitted, weigh) for kind in ORDER]
     seconds = sum(decision.seconds for decision in decisions)
     return Plan(tuple(decisions), active, settings, seconds, memory_bytes, levels=signal.levels)
+
+
+def with_lower_levels(signal: SignalLevels, tolerance: float) -> SignalLevels:
+    """Return a signal with every level, and with each as low as the light's error lets it be.
+
+    Levels are percentiles of light that errs by the tolerance, relative to full signal; relative
+    to a low one that is much. None is below the dark signal.
+    """
+    off = tolerance * signal.full_signal
+    lower = (max(level - off, min(level, signal.dark)) for level in signal.levels)
+    return replace(signal, levels=tuple(sorted({*signal.levels, *lower})))
 
 
 def _negligible(
