@@ -2,8 +2,8 @@
 
 Cells of the sensor see parts of the chart that are no rectangles. The chart is painted flat, as
 means over overlapping squares; between them a cubic spline gives the mean over a square anywhere.
-What a cell sees is taken as one square about its center, where it is nearly one, and else as four
-that have its second moments together.
+What a cell sees is taken as one square about its center, where it is nearly one, and else as two or
+four that have its second moments together.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -37,6 +38,23 @@ BEYOND = 10
 """Painted cells around those that are seen: a spline's ends change it by 0.27 a cell."""
 MOST_FINER = 8.0
 """Painted cells of a tile over its cells times `FINER` squared, at most: it is halved beyond."""
+EVEN = 1e-6
+"""Difference of cells, over the brightest light, up to which they hold one light: rounding."""
+BLOCK = 5
+"""Cells along each side of blocks that are even or not."""
+FEW = 160
+"""Cells along each side up to which a tile is not halved in order that two squares do for its
+halves: cells painted around it take a quarter as long as its own. With 80 `fisheye` takes 17 % more
+processor time."""
+LONGEST = 10.0
+"""Second moment along what a cell sees over that across, at most, of two squares: up to there
+their fourth moments miss no more than is allowed for (`warps._squares`)."""
+POLE = math.sqrt(3) - 2
+"""Factor by which the coefficients of a cubic spline fall."""
+AT_ONCE = 1 << 14
+"""Places that are interpolated at once: 2 MB."""
+IN_CACHE = 64
+"""Lines of a tile that are transposed at once: 0.2 MB."""
 POINTS = 4.0
 """Points of a chart along the distance of the nearest requested ones: between them its
 values are interpolated linearly."""
@@ -76,6 +94,13 @@ class Moments(NamedTuple):
         return Moments(self.xx - square, self.yy - square, self.xy)
 
     @property
+    def longer_axis(self) -> tuple[Array, Array]:
+        """The direction of the largest moment, as long as its root; 0 where it is negative."""
+        length = np.sqrt(np.maximum(self.ends[1], 0.0))
+        angle = np.arctan2(2 * self.xy, self.xx - self.yy) / 2
+        return length * np.cos(angle), length * np.sin(angle)
+
+    @property
     def root(self) -> Moments:
         """Square root of the symmetric matrix that they are."""
         root = np.sqrt(np.maximum(self.xx * self.yy - self.xy**2, 0.0))
@@ -98,7 +123,7 @@ class SmoothMap:
     def on_grid(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Return where the places of columns x (n,) and rows y (m,) [m] look: two of (m, n) [m]."""
         inside_x, inside_y = (np.clip(a, -h, h) for a, h in zip((x, y), self.half, strict=True))
-        found_x, found_y = self._sums(self.series, inside_x, inside_y)
+        ((found_x, found_y),) = self._sums((self.series,), inside_x, inside_y)
         found_x += self._slopes[0] * (x - inside_x)
         found_y += self._slopes[1] * (y - inside_y)[:, None]
         return found_x, found_y
@@ -112,21 +137,26 @@ class SmoothMap:
         along_x, along_y = (
             [part * (length / own) for part, own in zip(sums, size, strict=True)]
             for sums, length in zip(
-                (self._sums(series, inside_x, inside_y) for series in self._derivatives),
-                size,
-                strict=True,
+                self._sums(self._derivatives, inside_x, inside_y), size, strict=True
             )
         )
         return Moments(*(along_x[i] * along_x[j] + along_y[i] * along_y[j] for i, j in PAIRS))
 
-    def _sums(self, series: Array, x: Array, y: Array) -> tuple[Array, Array]:
-        """Return both sums (m, n) of series (2, k, l) at places of the rectangle."""
+    def _sums(self, every: Sequence[Array], x: Array, y: Array) -> list[tuple[Array, Array]]:
+        """Return both sums (m, n) of each series (2, k, l) at places of the rectangle."""
+        most = max(max(series.shape) for series in every)
         along_x, along_y = (
-            np.polynomial.chebyshev.chebvander(at / half, count - 1)
-            for at, half, count in zip((x, y), self.half, series.shape[:0:-1], strict=True)
+            np.polynomial.chebyshev.chebvander(at / half, most - 1)
+            for at, half in zip((x, y), self.half, strict=True)
         )
-        found_x, found_y = (product(product(along_y, each), along_x.T) for each in series)
-        return found_x, found_y
+        found = []
+        for series in every:
+            _, rows, columns = series.shape
+            sum_x, sum_y = (
+                product(product(along_y[:, :rows], each), along_x[:, :columns].T) for each in series
+            )
+            found.append((sum_x, sum_y))
+        return found
 
     @cached_property
     def _derivatives(self) -> tuple[Array, Array]:
@@ -141,7 +171,7 @@ class SmoothMap:
     def _slopes(self) -> tuple[float, float]:
         """Mean scale along both axes."""
         ends = np.array([-1.0, 1.0])
-        x, y = self._sums(self.series, ends * self.half[0], ends * self.half[1])
+        ((x, y),) = self._sums((self.series,), ends * self.half[0], ends * self.half[1])
         return (
             float((x[:, 1] - x[:, 0]).mean() / (2 * self.half[0])),
             float((y[1] - y[0]).mean() / (2 * self.half[1])),
@@ -280,52 +310,85 @@ class WarpedChart(Chart):
 
     def _tile(self, places: tuple[Array, Array], size: tuple[float, float], mix: Array) -> Array:
         """Return the averages (R, m, n) over cells about columns and rows of places."""
-        from scipy import ndimage
-
+        axis = int(len(places[1]) > len(places[0]))
+        few = self._few_moments(places, size)
+        if len(places[axis]) > FEW and self._is_better_halved(*few, size):
+            return self._halved_tile(places, axis, size, mix)
         centers = self.sees.on_grid(*places)
-        side, ways = self._squares(places, size)
+        side, ways = self._squares(places, size, few)
         grids = [
             _Grid.around([c + way[axis] for way in ways], side * size[axis] / FINER)
             for axis, c in enumerate(centers)
         ]
         painted = math.prod(grid.count for grid in grids)
-        axis = int(len(places[1]) > len(places[0]))
         if painted > MOST_FINER * FINER**2 * (centers[0].size + TILE) and len(places[axis]) > 1:
-            halves = (self._tile(half, size, mix) for half in _halves(places, axis))
-            return np.concatenate(list(halves), axis=2 - axis)
+            return self._halved_tile(places, axis, size, mix)
         x, y = (grid.edges for grid in grids)
         planes = self.chart.crop_to_cells(x, y).averages(x, y, mix)
-        splines = [
-            ndimage.spline_filter(_square_means(plane), output=plane.dtype, mode="mirror")
-            for plane in planes
-        ]
-        out = np.zeros((len(mix), *centers[0].shape), mix.dtype)
+        column, row = (grid.index(at) for grid, at in zip(grids, centers, strict=True))
+        farthest = max(
+            float(np.abs(way[axis]).max()) / grid.pitch
+            for way in ways
+            for axis, grid in enumerate(grids)
+        )
+        out, varies = _even_light(planes, row, column, farthest)
+        if not varies.any():
+            return out
+        spline, found = _spline(planes), np.zeros(1)
         for way in ways:
-            column, row = (g.index(c + w) for g, c, w in zip(grids, centers, way, strict=True))
-            for found, spline in zip(out, splines, strict=True):
-                found += ndimage.map_coordinates(
-                    spline, (row, column), output=spline.dtype, mode="mirror", prefilter=False
-                )
-        out /= len(ways)
+            across, down = (w / grid.pitch for w, grid in zip(way, grids, strict=True))
+            found = found + _interpolated(spline, (row + down)[varies], (column + across)[varies])
+        out[:, varies] = found / len(ways)
         return out
 
-    def _squares(
+    def _halved_tile(
+        self, places: tuple[Array, Array], axis: int, size: tuple[float, float], mix: Array
+    ) -> Array:
+        """Return the averages of a tile from those of its halves along an axis, x or y."""
+        halves = np.array_split(places[axis], 2)
+        tiles = [(places[0], half) if axis else (half, places[1]) for half in halves]
+        found = [self._tile(tile, size, mix) for tile in tiles]
+        return np.concatenate(found, axis=2 - axis)
+
+    def _few_moments(
         self, places: tuple[Array, Array], size: tuple[float, float]
+    ) -> tuple[Array, Array]:
+        """Return the least and the largest second moments at some places of a tile.
+
+        They are those of `SmoothMap.seen_moments`.
+        """
+        x, y = (np.linspace(at[0], at[-1], LOOKS_IN_TILE) for at in places)
+        return self.sees.seen_moments(x, y, size).ends
+
+    def _are_alike(self, least: Array, size: tuple[float, float]) -> bool:
+        """Return whether one square has nearly all of some second moments."""
+        return float(np.ptp(least)) / 2 * max(size) ** 2 / 12 <= self.alike
+
+    def _is_better_halved(self, least: Array, most: Array, size: tuple[float, float]) -> bool:
+        """Return whether two squares would do for some halves of a tile, though not for all."""
+        return not self._are_alike(least, size) and bool((most <= LONGEST * least).any())
+
+    def _squares(
+        self, places: tuple[Array, Array], size: tuple[float, float], few: tuple[Array, Array]
     ) -> tuple[float, Sequence[tuple[Array, Array]]]:
         """Return the side of squares over that of the cells, and where they lie about the centers.
 
-        There is one square where it has nearly the second moments of what the cells see.
+        There is one square where it has nearly the second moments of what the cells see, and two
+        where those along the shorter axis of what they see are nearly all alike. `few` are the
+        moments at some places.
         """
-        x, y = places
-        few_x, few_y = (np.linspace(at[0], at[-1], LOOKS_IN_TILE) for at in places)
-        least, most = self.sees.seen_moments(few_x, few_y, size).ends
-        low, high = float(least.min()), float(most.max())
-        if (high - low) / 2 * max(size) ** 2 / 12 <= self.alike:
-            return math.sqrt((low + high) / 2), [(np.zeros(1), np.zeros(1))]
-        moments = self.sees.seen_moments(x, y, size)
-        low = float(moments.ends[0].min())
-        root = moments.excess_over(low).root
+        ends = np.array(few)
+        if self._are_alike(ends, size):
+            return math.sqrt((ends.min() + ends.max()) / 2), [(np.zeros(1), np.zeros(1))]
+        moments = self.sees.seen_moments(*places, size)
         width, height = (length / math.sqrt(12) for length in size)
+        least, most = moments.ends
+        low, square = float(least.min()), float(least.min() + least.max()) / 2
+        if self._are_alike(least, size) and float(most.max()) <= LONGEST * square:
+            along_x, along_y = moments.excess_over(square).longer_axis
+            way = width * along_x, height * along_y
+            return math.sqrt(square), [way, (-way[0], -way[1])]
+        root = moments.excess_over(low).root
         return math.sqrt(low), [
             (width * (a * root.xx + b * root.xy), height * (a * root.xy + b * root.yy))
             for a, b in CORNERS
@@ -382,15 +445,119 @@ class _Grid:
         return (place - self.first) / self.pitch - FINER / 2
 
 
-def _halves(places: tuple[Array, Array], axis: int) -> list[tuple[Array, Array]]:
-    """Return both halves of columns and rows, across an axis."""
-    x, y = places
-    halves = np.array_split(places[axis], 2)
-    return [(x, half) if axis else (half, y) for half in halves]
+def _even_light(planes: Array, row: Array, column: Array, farthest: float) -> tuple[Array, Array]:
+    """Return the light (R, m, n) at places among squares as if it were even, and where it is not.
+
+    It is even where cells hold one light as far around a place as its spline sees, and squares
+    `farthest` from it. Nothing is interpolated there, which saves a fifth of the time before a
+    ColorChecker.
+
+    Parameters
+    ----------
+    planes : Array
+        Painted cells (R, ny, nx).
+    row, column : Array
+        Places (m, n) among the squares.
+    farthest : float
+        Largest distance of a square from its place [cells].
+    """
+    from scipy import ndimage
+
+    high, low = (_of_blocks(planes, pick) for pick in (np.maximum, np.minimum))
+    blocks_around = 2 * math.ceil((BEYOND + FINER + farthest) / BLOCK) + 1
+    size = 1, blocks_around, blocks_around
+    differ = ndimage.maximum_filter(high, size) - ndimage.minimum_filter(low, size)
+    varies = (differ > EVEN * np.abs(high).max()).any(axis=0)
+    block = (row / BLOCK).astype(np.intp), (column / BLOCK).astype(np.intp)
+    return low[:, *block], varies[block]
 
 
-def _square_means(plane: Array) -> Array:
-    """Return the means over squares of `FINER` cells along each side, one at every cell."""
-    rows, columns = (count - FINER + 1 for count in plane.shape)
-    tall = np.sum([plane[k : k + rows] for k in range(FINER)], axis=0)
-    return np.asarray(np.sum([tall[:, k : k + columns] for k in range(FINER)], axis=0) / FINER**2)
+def _of_blocks(planes: Array, pick: np.ufunc) -> Array:
+    """Return the largest or the least values (R, my, mx) of square blocks of `BLOCK` cells.
+
+    `pick` is the maximum or the minimum of two. NumPy's `reduceat` takes four times as long.
+    """
+    for _ in range(2):
+        found = planes[:, ::BLOCK].copy()
+        for k in range(1, BLOCK):
+            more = planes[:, k::BLOCK]
+            inside = found[:, : more.shape[1]]
+            pick(inside, more, out=inside)
+        planes = found.swapaxes(1, 2)
+    return planes
+
+
+def _spline(planes: Array) -> Array:
+    """Return the coefficients (nx, ny, R) of the cubic spline through the means over squares.
+
+    They are `FINER` cells (R, ny, nx) along each side, one at every cell.
+    """
+    ny, nx = (count - FINER + 1 for count in planes.shape[1:])
+    down = planes[:, :ny].swapaxes(0, 1).copy()
+    for k in range(1, FINER):
+        down += planes[:, k : k + ny].swapaxes(0, 1)
+    down *= 6 / FINER
+    _sharpen(down)
+    means = down[..., :nx].copy()
+    for k in range(1, FINER):
+        means += down[..., k : k + nx]
+    means *= 6 / FINER
+    out: Array = np.empty((nx, ny, len(planes)), planes.dtype)
+    lines, turned = means.reshape(-1, nx), out.reshape(nx, -1)
+    for some in pieces(len(lines), IN_CACHE):
+        turned[:, some] = lines[some].T
+    _sharpen(out)
+    return out
+
+
+def _sharpen(values: Array) -> None:
+    """Turn values (n, ...) times 6 into the coefficients of the splines through them.
+
+    Splines are mirrored at their ends. It takes half the time of SciPy's filter, which follows one
+    line after the other.
+    """
+    pole, step = values.dtype.type(POLE), np.empty_like(values[0])
+    lines = list(values)
+    lines[0][...] = np.tensordot(pole ** np.arange(BEYOND), values[:BEYOND], 1)
+    for last, line in pairwise(lines):
+        np.multiply(last, pole, out=step)
+        np.add(line, step, out=line)
+    lines[-1][...] = (lines[-1] + pole * lines[-2]) * (pole / (pole**2 - 1))
+    for last, line in pairwise(reversed(lines)):
+        np.subtract(last, line, out=step)
+        np.multiply(step, pole, out=line)
+
+
+def _interpolated(spline: Array, row: Array, column: Array) -> Array:
+    """Return a spline (nx, ny, R) at places (k,): (R, k).
+
+    A sparse product shares the weights among the planes: 2.8 times as fast as SciPy's
+    interpolation of four, 1.15 times of one.
+    """
+    from scipy import sparse
+
+    _, ny, count = spline.shape
+    flat, found = spline.reshape(-1, count), np.empty((count, len(row)), spline.dtype)
+    around = np.add.outer(ny * np.arange(4), np.arange(4)).ravel().astype(np.int32)
+    for some in pieces(len(row), AT_ONCE):
+        (i, down), (j, across) = (_cubic_weights(at[some], spline.dtype) for at in (row, column))
+        terms = (ny * j + i)[:, None] + around
+        weights = across[:, :, None] * down[:, None]
+        ends = np.arange(len(terms) + 1, dtype=np.int32) * 16
+        matrix = sparse.csr_array(
+            (weights.ravel(), terms.ravel(), ends), shape=(len(terms), len(flat))
+        )
+        found[:, some] = (matrix @ flat).T
+    return found
+
+
+def _cubic_weights(place: Array, dtype: np.dtype) -> tuple[Array, Array]:
+    """Return the first of four coefficients (k,) about places, and what each counts (k, 4)."""
+    first = np.floor(place).astype(np.int32)
+    t = (place - first).astype(dtype)
+    weights: Array = np.empty((len(t), 4), dtype)
+    weights[:, 0] = (1 - t) ** 3 / 6
+    weights[:, 1] = 2 / 3 - t * t * (1 - t / 2)
+    weights[:, 3] = t**3 / 6
+    weights[:, 2] = 1 - weights[:, 0] - weights[:, 1] - weights[:, 3]
+    return first - 1, weights
