@@ -15,10 +15,7 @@ import pytest
         ("array", "80268"),  # 2.4 T: rows were read by where their photodetectors are
         ("array", "80184"),  # 1.4 times the variance: levels of pixels, not of joined ones
         ("field", "80012"),  # 1.2 T: few places on a stretch of the field
-        (
-            "depth",
-            "100034",
-        ),  # variance: light at the 1st percentile was 2 % of full signal too high
+        ("depth", "100034"),  # variance: dark light was 2 % of full signal too high
         ("lone", "80400"),  # 1.1 T: one pixel may lose more than all places do on average
         ("chart", "100096"),  # 1.1 T: an edge lies alike to all cells, and to all pixels, along it
         ("moved", "100024"),  # 2.9 T: coarse samples of a spread ring beyond their grid
