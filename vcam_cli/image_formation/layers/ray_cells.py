@@ -1,9 +1,9 @@
 """Cells of a window on which rays meet layers, and what sharp lens and pixels make of an image.
 
 Cells divide pixels evenly where lens or silicon blur the image on them. Where a pixel sees its own
-photodetector alone, they divide that, and the gap to the next one is a cell of its own: a cell
-astride the rim of a photodetector would mix what is seen with what is not, and halves and thirds of
-a pixel may err alike (by 4.4 % of full signal in a pixel, where edges of layers lie in the gap).
+photodetector alone, they divide that, and apart from it the gap to the next one: a cell astride the
+rim of a photodetector would mix what is seen with what is not, and halves and thirds of a pixel may
+err alike (by 4.4 % of full signal in a pixel, where edges of layers lie in the gap).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ BORDER = 4
 TINY = 1e-9
 """Width of a photodetector that is a point [cells]."""
 NARROWEST = 1e-3
-"""Part of a pixel that is divided into cells, at least: layers are even on so little."""
+"""Part of a pixel that rays come from, at least: layers are even on so little."""
 ENTRIES = 1024
 """Frequencies at which a round transfer function is tabulated."""
 POINTS = 4
@@ -90,7 +90,7 @@ class Cells:
     geometry: Geometry
     window: Window
     per_pixel: int
-    """Along either side of what of a pixel is divided."""
+    """Along either side of a pixel's part that rays come from."""
     border: int
     """Cells around the window that sharp lens and silicon blur into it."""
     reach: tuple[int, int]
@@ -98,7 +98,7 @@ class Cells:
     single: bool = True
     """Whether light is in 32-bit numbers."""
     divided: tuple[float, float] = (1.0, 1.0)
-    """Part of a pixel along x and y that is divided; the rest is a cell of its own."""
+    """Part of a pixel along x and y that rays come from; the rest has cells of its own."""
 
     @property
     def sides(self) -> tuple[float, float]:
@@ -144,7 +144,8 @@ class Cells:
             beyond, side = around + self.reach[1 - axis], self.sides[axis]
             first = center[0] - pitch * self.divided[axis] / 2
             pixels = first + pitch * np.arange(-beyond, len(center) + beyond)
-            inside = side * np.arange(self._of_pixel(axis))
+            gap = np.linspace(self.divided[axis] * pitch, pitch, self._in_gap(axis) + 1)[:-1]
+            inside = np.append(side * np.arange(self.per_pixel), gap)
             edges = (pixels[:, None] + inside).ravel()
             found.append(np.append(edges, pixels[-1] + pitch))
         return found[0], found[1]
@@ -170,18 +171,22 @@ class Cells:
             return slice(top, top + rows), slice(left, left + columns)
         found = []
         for axis in (1, 0):
-            within, pixels = self._of_pixel(axis), self.window.pixels[1 - axis]
-            at = np.arange(self.per_pixel) + offset[axis]
-            period = self.per_pixel / self.divided[axis]
+            count, gaps = self.per_pixel, self._in_gap(axis)
+            at, period = np.arange(count) + offset[axis], count / self.divided[axis]
             pixel = np.floor(at / period)
-            cell = np.minimum(np.floor(at - pixel * period), within - 1)
-            index = (within * (self.reach[1 - axis] + pixel) + cell).astype(int)
-            found.append((within * np.arange(pixels)[:, None] + index).ravel())
+            cell = at - pixel * period
+            if gaps:
+                beyond = count + (cell - count) * (gaps / (period - count))
+                cell = np.where(cell < count, cell, beyond)
+            cell = np.minimum(np.floor(cell), count + gaps - 1)
+            index = ((count + gaps) * (self.reach[1 - axis] + pixel) + cell).astype(int)
+            pixels = np.arange(self.window.pixels[1 - axis])[:, None]
+            found.append(((count + gaps) * pixels + index).ravel())
         return found[0][:, None], found[1]
 
-    def _of_pixel(self, axis: int) -> int:
-        """Return the cells along a pixel's side, with the gap."""
-        return self.per_pixel + (self.divided[axis] < 1)
+    def _in_gap(self, axis: int) -> int:
+        """Return the cells along the gap between two pixels' parts, no larger than even ones."""
+        return math.ceil(self.per_pixel * (1 - self.divided[axis]))
 
 
 class SharpImage:
@@ -241,7 +246,7 @@ class SharpImage:
         return not (self._transfer.effects or self._separable)
 
     def divided(self, g: Geometry) -> tuple[float, float]:
-        """Return the part of a pixel along x and y that is to be divided into cells.
+        """Return the part of a pixel along x and y that rays come from.
 
         Parameters
         ----------
