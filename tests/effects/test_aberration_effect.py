@@ -320,6 +320,21 @@ def test_channels_are_straight_in_between_and_held_outside(tmp_path):
     np.testing.assert_allclose(at[800], red, atol=1e-12)
 
 
+def test_a_file_may_be_written_anew(tmp_path):
+    """Tables are kept by the lens: of two spreads of one name they are not the same."""
+    scene = {"scene.source": {"kind": "chart", "chart": "slanted-edge"}}
+    psf = {"optics.psf": {"file": str(tmp_path / "p.exr"), "pitch": "3 um"}}
+    found = []
+    for ghost in (0, 4, 0):
+        planes = np.zeros((5, 5))
+        planes[2, 2], planes[2, ghost] = 1, 0.5
+        spread(tmp_path / "p.exr", planes)
+        found.append(mean_of(tmp_path, **scene, **psf))
+    # What goes two samples to the left with one file goes to the right with the other.
+    assert np.abs(found[1] - found[0]).max() > 0.1 * found[0].max()
+    np.testing.assert_array_equal(found[2], found[0])
+
+
 def test_it_takes_the_place_of_diffraction(tmp_path):
     file = spread(tmp_path / "p.exr", gaussian(2))
     given_ = {"optics.psf": {"file": file, "pitch": "1 um"}}

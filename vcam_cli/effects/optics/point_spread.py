@@ -5,6 +5,7 @@ It has both aberrations and diffraction in it, so the effect `diffraction` goes.
 
 from __future__ import annotations
 
+import hashlib
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -44,6 +45,8 @@ class PointSpread(AberrationBlur, PlaneTransfer):
     """Wavelengths of the channels [m]; empty where there is one for all wavelengths."""
     samples: Array | None = field(compare=False, repr=False)
     """Samples (channels, rows, columns), each of sum 1; None before the file was read."""
+    content: bytes = field(repr=False)
+    """Digest of the samples, by which blurs are equal: a file may be written anew."""
 
     @classmethod
     def from_camera(cls, camera: Camera, geometry: Geometry) -> PointSpread | None:
@@ -51,7 +54,9 @@ class PointSpread(AberrationBlur, PlaneTransfer):
         psf = camera.optics.psf
         if psf is None:
             return None
-        return cls(psf.file, psf.pitch, psf.wavelengths, camera.samples(PSF))
+        samples = camera.samples(PSF)
+        content = b"" if samples is None else hashlib.sha256(samples.tobytes()).digest()
+        return cls(psf.file, psf.pitch, psf.wavelengths, samples, content)
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
