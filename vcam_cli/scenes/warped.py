@@ -39,7 +39,7 @@ BEYOND = 10
 MOST_FINER = 8.0
 """Painted cells of a tile over its cells times `FINER` squared, at most: it is halved beyond."""
 EVEN = 1e-6
-"""Difference of cells, over the brightest light, up to which they hold one light: rounding."""
+"""Difference of cells, over the brighter, up to which they hold one light: rounding."""
 BLOCK = 5
 """Cells along each side of blocks that are even or not."""
 FEW = 160
@@ -334,7 +334,8 @@ class WarpedChart(Chart):
         out, varies = _even_light(planes, row, column, farthest)
         if not varies.any():
             return out
-        spline, found = _spline(planes), np.zeros(1)
+        spline = _spline(planes)
+        found: Array = np.zeros(1, planes.dtype)
         for way in ways:
             across, down = (w / grid.pitch for w, grid in zip(way, grids, strict=True))
             found = found + _interpolated(spline, (row + down)[varies], (column + across)[varies])
@@ -463,11 +464,12 @@ def _even_light(planes: Array, row: Array, column: Array, farthest: float) -> tu
     """
     from scipy import ndimage
 
-    high, low = (_of_blocks(planes, pick) for pick in (np.maximum, np.minimum))
     blocks_around = 2 * math.ceil((BEYOND + FINER + farthest) / BLOCK) + 1
     size = 1, blocks_around, blocks_around
-    differ = ndimage.maximum_filter(high, size) - ndimage.minimum_filter(low, size)
-    varies = (differ > EVEN * np.abs(high).max()).any(axis=0)
+    low = _of_blocks(planes, np.minimum)
+    least = ndimage.minimum_filter(low, size)
+    most = ndimage.maximum_filter(_of_blocks(planes, np.maximum), size)
+    varies: Array = np.any(most - least > EVEN * np.maximum(most, -least), axis=0)
     block = (row / BLOCK).astype(np.intp), (column / BLOCK).astype(np.intp)
     return low[:, *block], varies[block]
 
