@@ -66,6 +66,8 @@ CAMERAS = {
         "accuracy": "standard",
         DARK: "100 e/s",
         "optics.lateral_color": {"table": {450: "-2 %", 650: "2 %"}},
+        "array.rows": 24,
+        "array.columns": 32,
     }
     | BAYER
     | PATCHES

@@ -18,10 +18,7 @@ from vcam_cli.verification.stack_prediction import FALSE_ALARMS, STACKS, Judged,
 from vcam_cli.verification.stack_quantities import quantities
 
 FEW = "dark, short", "half"
-QUICK = (
-    *("gain 3 % high", "no row noise", "PRNU 15 % low", "no telegraph noise"),
-    *("gain 5 % low, efficiency matched", "read noise 5 % low", "DSNU 10 % high"),
-)
+QUICK = (*("gain 3 % high", "no row noise", "PRNU 15 % low", "read noise 5 % low"),)
 
 
 @pytest.fixture(scope="module")
