@@ -465,6 +465,34 @@ def test_a_chart_without_detail_needs_no_further():
     assert highest_passed(optical_path, on_chart(optical_path, HalfPlane(0.0))) > 1
 
 
+def test_kinks_of_a_mirrored_chart_lose_a_fiftieth_of_the_tolerance(tmp_path, monkeypatch):
+    """A smooth chart is sharp where it is mirrored: beside the same followed much further."""
+    changes = {
+        "scene.source": {"kind": "chart", "chart": "csf", "max_frequency": "20 lp/mm"},
+        "optics.f_number": 2,
+        "accuracy": "reference",
+    }
+    found = rate(camera(tmp_path, changes))
+    monkeypatch.setattr(bandwidth, "KINKS", 64.0)
+    finer = rate(camera(tmp_path, changes))
+    assert rms(found.values, finer.values) < 2e-4 / 50 * finer.values.max()
+
+
+def test_charts_differ_from_their_mirror_images_as_assumed(tmp_path):
+    """Beyond a fifth of the width, beside white: of charts that resemble pictures together."""
+    squares = []
+    for name in ("colorchecker", "eye-chart", "dead-leaves"):
+        changes = {"scene.source": {"kind": "chart", "chart": name}, "accuracy": "draft"}
+        ready = prepare(camera(tmp_path, changes), 1)[0]
+        width, height = ready.geometry.sensor_width, ready.geometry.sensor_height
+        depth, y = np.linspace(0, 0.2 * width, 40), np.linspace(-0.45, 0.45, 40) * height
+        x = np.concatenate([-width / 2 - depth[::-1], -width / 2 + depth])
+        light = ready.scene.values_at(x, y, np.abs(ready.transfer.level).T)
+        difference = light[..., :40] - light[..., :39:-1]
+        squares.append(np.mean(np.square(difference / ready.white_rate.max())))
+    assert pytest.approx(math.sqrt(np.mean(squares)), rel=0.4) == bandwidth.CONTRAST
+
+
 def test_tables_reach_the_corner_or_the_lens():
     g = sensor(40, 60, pitch=(PITCH, 2 * PITCH))
     for n in (2.0, 30.0):

@@ -216,6 +216,28 @@ def test_waves_through_zones():
     assert len(list(harmonic_scenes.wave_layers(optical_path, scene)[0])) == 2
 
 
+def test_what_is_left_of_zones_is_a_hundredth_of_the_tolerance():
+    """Of zones that hardly differ: by 1.4 hundredths, which are kept."""
+    g = sensor(40, 60, (0.8, 0.6))
+    knobs = replace(EXACT, tolerance=0.005)
+    allowed = 0.01 * knobs.tolerance * 0.6  # of the largest amplitude
+    scene = WaveScene((WHITE,), (Wave((0.6,)), Wave((0.3,), 0.13 / PITCH)), WHITE)
+
+    def alone(end):
+        return signal(path(g, end, aperture(g), knobs=EXACT), scene)
+
+    def end(more: float):
+        return Slanted(0.0, 0.0, PITCH * (1 + more), PITCH)
+
+    differs = np.abs(alone(end(1e-3)) - alone(end(0.0))).max()
+    ends = end(0.0), end(1e-3 * 2 * 1.4 * allowed / differs)
+    changing = Changing(*ends, g.sensor_width / 2)
+    found = signal(path(g, changing, aperture(g), knobs=knobs), scene)
+    x = (np.arange(60) - 29.5) / 60
+    error = found - ((0.5 - x) * alone(ends[0]) + (0.5 + x) * alone(ends[1]))
+    assert np.abs(error).max() <= allowed
+
+
 def test_even_light_stays_even_through_zones():
     """No blur changes it: no zone's transfer is asked for."""
 

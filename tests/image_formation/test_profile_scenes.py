@@ -73,6 +73,22 @@ def test_edges_against_the_line_spread_of_a_perfect_lens(shape, angle):
     assert min(rms(found, each) for each in expected) < 4e-5
 
 
+@pytest.mark.parametrize("tolerance", [0.02, 0.005, 2e-4])
+def test_periods_and_tables_take_little_of_the_tolerance(tolerance):
+    """Beside the same edge with a thousandth of the tolerance: 0.7 % of it at most."""
+    g = sensor(24, 32, fill=(0.8, 0.6))
+    found = []
+    for part in (1.0, 1e-3):
+        seen = path(g, Diffraction(8.0, 0.0), aperture(g), knobs=finely(part * tolerance))
+        found.append(signal(seen, on_chart(seen, SlantedEdge(0.1, 0.6))))
+    assert rms(*found) < 0.007 * tolerance
+
+
+def finely(tolerance: float):
+    """Settings whose tolerance alone limits how light is computed."""
+    return replace(STANDARD, tolerance=tolerance, table_size=4097, float_width=64)
+
+
 def test_steps_of_a_wedge_are_edges_that_add_up():
     """Each patch between two edges, by the line spread function of a perfect lens."""
     g = sensor(3, 61)

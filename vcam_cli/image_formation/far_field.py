@@ -47,7 +47,7 @@ is left at the former, 1e-5; its kernel falls fast and has no second moment, so 
 that changes slowly as it is."""
 
 PLACES = 4096
-"""Places of the array at which far light is judged, about,"""
+"""Places of the array at which far light is judged, about: it varies slowly. A matter of cost,"""
 MODES_SHARE = 0.1
 """and part of the tolerance that it may be where the modes of the field are left out."""
 

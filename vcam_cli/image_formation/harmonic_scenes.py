@@ -29,7 +29,7 @@ MOST_HARMONICS = 512
 LEFT = 0.01
 """Part of the tolerance that the modes of the field may leave."""
 ROWS = 64
-"""Rows of pixels, about, on which changes are measured."""
+"""Rows of pixels, about, on which changes are measured for the report: a matter of cost."""
 
 Weight = Callable[[Array, Array], Array] | None
 """A factor at positions x (columns,), y (rows,) [m]; None for 1 everywhere."""

@@ -19,7 +19,8 @@ from vcam_cli.effects.pixel_signal import Charge, Gain, VeilingGlare
 from vcam_cli.effects.signal_chain import Limit
 
 SAMPLE = 1 << 14
-"""Pixels that are computed, at most."""
+"""Pixels that are computed, at most. A matter of cost: an rms over them has a standard error of
+0.6 %."""
 LEAST = 1e-6
 """Factor below which the light in front of an effect is no longer known."""
 

@@ -25,13 +25,15 @@ from vcam_cli.image_formation.transfer_tables import Mixing, Tables, bounding_ta
 from vcam_cli.scenes.base import ChartScene, SampledScene
 
 SINGLE = 5e-7
-"""Rms error of transforms of 32-bit numbers, relative to the largest of what is transformed."""
+"""Rms error of transforms of 32-bit numbers, relative to the largest of what is transformed.
+1.6e-7 was measured with 300 x 400 samples; larger transforms err more, with the logarithm."""
 SINGLE_SHARE = 0.1
 """Part of the tolerance that it may use: else numbers have 64 bits."""
 BEYOND_CUTOFF = 1.1
 """Cells of a chart in closed form over the highest frequency: they scale its terms, no more."""
 ENTRIES = 513
-"""Entries of tables with which power is judged."""
+"""Entries of tables with which power is judged. A matter of cost: with 65 to 4097 the spectrum of a
+star ends at the same frequency at every preset."""
 
 
 @dataclass(frozen=True, eq=False)
