@@ -59,8 +59,8 @@ KINKS = 4.0
 spectrum falls with the square of the frequency. Beyond it lies less than a hundredth of the
 tolerance of a CSF chart behind f/2; beyond half of it, an eighth."""
 LEAST_PASSED = 0.01
-"""Part of the tolerance below which what the lens passes of full contrast counts as nothing. A matter
-of cost: below, power decides, and ten times as much leaves a star as it is."""
+"""Part of the tolerance below which what the lens passes of full contrast counts as nothing. A
+matter of cost: below, power decides, and ten times as much leaves a star as it is."""
 
 
 @remembered(16)  # 6 % of a frame of 64 x 64 pixels of a data set
