@@ -191,11 +191,6 @@ def test_what_cannot_be_imaged_is_refused(tmp_path):
     table = tmp_path / "d.csv"
     table.write_text("image_height_mm,distortion_percent\n0,0\n0.1,0\n0.11,40\n")
     assert "folds the image" in message(tmp_path, {"optics.distortion": {"file": str(table)}})
-    layer = {"source": {"kind": "chart", "chart": "uniform"}, "distance": "1 m"}
-    layers = {"kind": "layers", "layers": [layer]}
-    assert "depth or layers" in message(
-        tmp_path, {"scene.source": layers, "optics.distortion": {"k1": -1}}
-    )
 
 
 def test_the_corrected_picture_is_that_of_a_lens_that_does_not_distort(tmp_path):

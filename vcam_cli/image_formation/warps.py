@@ -175,7 +175,7 @@ def warped_layers(path: OpticalPath, scene: AnyScene) -> tuple[Layers, SpectrumR
     path : OpticalPath
         Lens, pixels and settings.
     scene : AnyScene
-        The scene; before still warps one without depth.
+        The scene; before still warps one without a map of depth.
 
     Returns
     -------
@@ -189,12 +189,13 @@ def warped_layers(path: OpticalPath, scene: AnyScene) -> tuple[Layers, SpectrumR
     CannotDo
         Where memory does not suffice.
     """
-    path = _with_magnifying_blur(path)
+    if not isinstance(scene, LayeredScene):  # whose layers have blurs of their own
+        path = _with_magnifying_blur(path)
     warps = Warps(of_kind(path.effects, Warp))
     if not warps.still:
         return image_layers(path, scene)
-    if isinstance(scene, LayeredScene | DepthScene):
-        raise ValueError("no still warp of a scene with depth: `lens_mapping.check` refuses that")
+    if isinstance(scene, DepthScene):
+        raise ValueError("no still warp of a map of depth: `lens_mapping.check` refuses that")
     if path.transfer.is_dark or _is_even(scene):
         return image_layers(_without_still(path, path.effects), scene)
     rest = _without_still(path, _about_the_middle(path, warps))
@@ -205,8 +206,14 @@ def warped_layers(path: OpticalPath, scene: AnyScene) -> tuple[Layers, SpectrumR
     ]
     reports = [report for _, report in found]
     if not seen.is_magnified:
-        reports = [replace(own, warped_values=own.cells * own.planes) for own in reports]
+        reports = [_with_warped_values(own) for own in reports]
     return chain(*(layers for layers, _ in found)), _joined(rest, reports)
+
+
+def _with_warped_values(report: SpectrumReport) -> SpectrumReport:
+    """Return a report whose cells, and those of its layers, were painted through a map."""
+    parts = tuple((g, colors, _with_warped_values(own)) for g, colors, own in report.parts)
+    return replace(report, warped_values=report.cells * report.planes, parts=parts)
 
 
 @dataclass(frozen=True)
@@ -214,22 +221,27 @@ class _SeenScene:
     """A scene before the still warps of a path."""
 
     path: OpticalPath
-    scene: Scene
+    scene: Scene | LayeredScene
     warps: Warps
 
     @property
     def is_magnified(self) -> bool:
         """Whether still warps only magnify it."""
         still = self.warps.still
+        if isinstance(self.scene, LayeredScene):
+            return False
         return len(of_kind(still, Magnification)) == len(still)
 
-    def at(self, wavelength: float) -> Scene:
+    def at(self, wavelength: float) -> AnyScene:
         """Return the scene as a wavelength shows it on the sensor."""
         if self.is_magnified:
+            assert not isinstance(self.scene, LayeredScene)
             magnifications = of_kind(self.warps.still, Magnification)
             factor = math.prod(each.factor(wavelength) for each in magnifications)
             return magnified(self.scene, factor) if factor != 1 else self.scene
         sees = self.warps.map_at(wavelength, _half(self.path, self.warps), moved=True)
+        if isinstance(self.scene, LayeredScene):
+            return self.scene.warped(sees, *_squares(self.path, sees))
         chart = WarpedChart(self.chart.chart, sees, *_squares(self.path, sees))
         return replace(self.chart, chart=chart)
 
@@ -370,13 +382,45 @@ def ideal_values(
     Array
         Values (R, m, n).
     """
+    sees = _green_map(effects, geometry)
+    if sees is None or isinstance(scene, DepthScene) or _is_even(scene):
+        return scene.values_at(x, y, mix)
+    if isinstance(scene, LayeredScene):
+        return scene.warped(sees).values_at(x, y, mix)
+    return WarpedChart(_chart(scene), sees).values(x, y, mix)
+
+
+def ideal_layers(
+    scene: LayeredScene, effects: Sequence[Effect], geometry: Geometry
+) -> LayeredScene:
+    """Return layers as a lens displaces their green light.
+
+    Parameters
+    ----------
+    scene : LayeredScene
+        The layers.
+    effects : sequence of Effect
+        Effects of the camera. Still warps other than magnifications count.
+    geometry : Geometry
+        Geometry of the array.
+
+    Returns
+    -------
+    LayeredScene
+        The layers; these themselves behind a lens that does not distort.
+    """
+    sees = _green_map(effects, geometry)
+    return scene if sees is None else scene.warped(sees)
+
+
+def _green_map(effects: Sequence[Effect], geometry: Geometry) -> SmoothMap | None:
+    """Return where an array sees green light from; None where no lens distorts."""
     still = of_kind(effects, StillWarp)
     kept = tuple(warp for warp in still if warp not in of_kind(still, Magnification))
-    if not kept or isinstance(scene, LayeredScene | DepthScene) or _is_even(scene):
-        return scene.values_at(x, y, mix)
+    if not kept:
+        return None
     half = geometry.sensor_width / 2, geometry.sensor_height / 2
-    sees = Warps(kept).map_at(GREEN, half, moved=False)
-    return WarpedChart(_chart(scene), sees).values(x, y, mix)
+    return Warps(kept).map_at(GREEN, half, moved=False)
 
 
 def _extremes(still: Sequence[StillWarp]) -> list[float]:
@@ -411,14 +455,14 @@ def _is_even(scene: AnyScene) -> bool:
     return isinstance(scene, WaveScene) and not any(w.fx or w.fy for w in scene.waves)
 
 
-def _as_chart(path: OpticalPath, scene: Scene) -> ChartScene:
-    """Return a scene as a chart on cells."""
+def _as_chart(path: OpticalPath, scene: Scene | LayeredScene) -> ChartScene:
+    """Return a scene as a chart on cells; layers as a pinhole sees them."""
+    if isinstance(scene, LayeredScene):
+        return scene.flat
     if isinstance(scene, HarmonicScene):
         return scene.chart
     if isinstance(scene, ChartScene):
         return scene
-    if isinstance(scene, LayeredScene | DepthScene):
-        raise TypeError(f"a {type(scene).__name__} is warped by its layers")
     g = path.geometry
     band = float(path.transfer.wavelengths[0]), float(path.transfer.wavelengths[-1])
     beyond = margin(g, path.effects, band, path.settings)

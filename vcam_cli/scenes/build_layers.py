@@ -100,5 +100,5 @@ def _picture_frame(picture: Array, view: View) -> Frame:
     rows, columns, _ = picture.shape
     width = view.scene_width
     if width is None:
-        width = max(view.width, view.height * columns / rows)
+        width = max(view.size[0], view.size[1] * columns / rows)
     return Frame(width, width * rows / columns)

@@ -19,6 +19,7 @@ from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, total_energy
 from vcam_cli.scenes.framed import chart_scene
 from vcam_cli.scenes.picture_chart import PictureChart
+from vcam_cli.scenes.warped import SmoothMap, WarpedChart
 from vcam_cli.spectra import Spectrum
 
 PARTS = 4
@@ -27,10 +28,14 @@ composited. The size of cells within pixels is chosen by their error, which incl
 MOST_BORDERS = 16
 """Borders of samples in a cell that divide it, at most, in the mean: then their light and opacity
 vary together by a sixteenth of their value, in one of this number of squared samples."""
+AROUND = 6.0
+"""Widths of a cell from which a cell sees nothing of a layer: splines leave 2e-6 of it there."""
 MOST_PARTS = 1 << 20
 """Parts of cells, about, that are held at once."""
 SAME = 1e-6
 """Part of a cell below which two places are one."""
+EVEN = 1e-5
+"""Variance within a cell below which opacity is even there: twice the rounding of its square."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,24 +112,32 @@ class MaskedChart(Chart):
 class LayerChart(Chart):
     """A layer's light times its opacity, and, as the last component, its opacity, in its place."""
 
-    layer: MaskedChart | PictureChart
+    layer: "MaskedChart | PictureChart | WarpedLayer"
     """The same around the origin."""
     center: tuple[float, float] = (0.0, 0.0)
     """Of the layer, right and down [m]."""
 
     edge_seconds = property(lambda self: self.layer.edge_seconds)
+    undivided = property(lambda self: self.layer.undivided)
 
     @property
     def brightest(self) -> float:
         """Brightest light, relative to the perfect white; opacity is as bright as white."""
         return max(self.layer.brightest, 1.0)
 
-    @property
-    def cover(self) -> PictureChart:
-        """Its opacity alone, around the origin."""
+    def opacity_ends(self, x_edges: Array, y_edges: Array) -> tuple[Array, Array]:
+        """Return bounds on the least and the largest opacity in cells (rows, columns)."""
+        x, y = x_edges - self.center[0], y_edges - self.center[1]
+        if isinstance(self.layer, WarpedLayer):
+            return self.layer.opacity_ends(x, y)
         if isinstance(self.layer, MaskedChart):
-            return self.layer.opacity
-        return self.layer.channel(-1)
+            cover = self.layer.opacity
+        else:
+            cover = self.layer.channel(-1)
+        one = np.ones((1, 1), cover.picture.dtype)
+        mean, square = (chart.averages(x, y, one)[0] for chart in (cover, cover.squared))
+        uneven = square - np.square(mean) > EVEN
+        return np.where(uneven, 0, mean), np.where(uneven, cover.picture.max(), mean)
 
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
         """Write the averages over the cells."""
@@ -144,10 +157,16 @@ class LayerChart(Chart):
 
     def crop_to_cells(self, x_edges: Array, y_edges: Array) -> "LayerChart":
         """Return the same layer as a chart that may be faster on these cells."""
-        if isinstance(self.layer, PictureChart):
+        if not isinstance(self.layer, MaskedChart):
             return self
         x, y = x_edges - self.center[0], y_edges - self.center[1]
         return replace(self, layer=self.layer.crop_to_cells(x, y))
+
+    def box_averages(
+        self, x: Array, y: Array, size: tuple[float, float], mix: Array
+    ) -> Array | None:
+        """Return the averages over boxes, where the layer knows them."""
+        return self.layer.box_averages(x - self.center[0], y - self.center[1], size, mix)
 
     def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
         """Return the energy of the layer in its place."""
@@ -156,6 +175,53 @@ class LayerChart(Chart):
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the values at points."""
         return self.layer.values(x - self.center[0], y - self.center[1], mix)
+
+
+@dataclass(frozen=True, eq=False)
+class WarpedLayer(WarpedChart):
+    """A layer in its place, seen through a map.
+
+    Cells that look beside its rectangle see nothing: that is known without painting them. A
+    frame of the shipped table top takes 4.3 s of processor time in place of 6.7.
+    """
+
+    chart: LayerChart
+    frame: Frame | None = None
+    """Rectangle that it lies in, about its center; None where it fills the frame."""
+
+    def _tile(self, places: tuple[Array, Array], size: tuple[float, float], mix: Array) -> Array:
+        if self.frame is not None:
+            seen = self.sees.on_grid(*places)
+            beyond = AROUND * self.sees.scales[1] * max(size)
+            lengths = self.frame.width, self.frame.height
+            for at, center, length in zip(seen, self.chart.center, lengths, strict=True):
+                half = length / 2 + beyond
+                if at.min() > center + half or at.max() < center - half:
+                    return np.zeros((len(mix), *at.shape), mix.dtype)
+        return super()._tile(places, size, mix)
+
+    def opacity_ends(self, x_edges: Array, y_edges: Array) -> tuple[Array, Array]:
+        """Return bounds on the least and the largest opacity in cells (rows, columns).
+
+        They are those of all flat cells that a cell may see: about the one where its center looks,
+        as far as half its diagonal at the largest scale, and one more.
+        """
+        from scipy.ndimage import maximum_filter, minimum_filter
+
+        pitches = [float(edges[-1] - edges[0]) / (len(edges) - 1) for edges in (x_edges, y_edges)]
+        centers = ((edges[1:] + edges[:-1]) / 2 for edges in (x_edges, y_edges))
+        seen, pitch = self.sees.on_grid(*centers), min(pitches)
+        far = math.ceil(self.sees.scales[1] * math.hypot(*pitches) / 2 / pitch) + 1
+        edges, index = [], []
+        for at in seen:
+            first = float(at.min()) - far * pitch
+            count = math.ceil((float(at.max()) - first) / pitch) + far + 1
+            edges.append(first + pitch * np.arange(count + 1))
+            index.append(((at - first) / pitch).astype(int))
+        low, high = self.chart.opacity_ends(*edges)
+        size = 2 * far + 1
+        least, most = minimum_filter(low, size), maximum_filter(high, size)
+        return least[index[1], index[0]], most[index[1], index[0]]
 
 
 @dataclass(frozen=True)
@@ -298,6 +364,37 @@ class LayeredScene:
             Values (R, m, n), in the unit of `mix`.
         """
         return self.flat.values_at(x, y, mix)
+
+    def warped(
+        self,
+        sees: SmoothMap,
+        widest: float = math.inf,
+        sharp: float = math.inf,
+        alike: float = math.inf,
+    ) -> "LayeredScene":
+        """Return the layers as a lens shows them that distorts, each before its blur.
+
+        Parameters
+        ----------
+        sees : SmoothMap
+            Where places of the sensor look.
+        widest, sharp, alike : float, optional
+            As those of a `WarpedChart` [m, m, m2].
+
+        Returns
+        -------
+        LayeredScene
+            The layers. None has a known size: a distorted rectangle is none.
+        """
+        how = sees, widest, sharp, alike
+        parts = (
+            replace(
+                part, chart=LayerChart(WarpedLayer(part.chart, *how, frame=part.size)), size=None
+            )
+            for part in self.parts
+        )
+        flat = replace(self.flat, chart=WarpedChart(self.flat.chart, *how))
+        return LayeredScene(tuple(parts), flat)
 
     def nearest_at(self, x: Array, y: Array) -> Array:
         """Return the number of the nearest layer that covers half of a point or more.

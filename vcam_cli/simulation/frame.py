@@ -185,12 +185,18 @@ class Frame(Prepared):
     def depth(self) -> Array:
         """Return how far away is what the pixels' centers see, along the axis (rows, columns) [m].
 
-        Of layers the nearest one counts that covers half of a place or more.
+        Of layers the nearest one counts that covers half of a place or more. It is distorted, or
+        corrected, as the picture is.
         """
         layout, source = self.layout, self.solved.scene.source
         if isinstance(self.scene, LayeredScene) and isinstance(source, Layers):
             distances = np.array([layer.distance for layer in source.layers])
-            return distances[self.scene.nearest_at(layout.picture_x, layout.picture_y)]
+            zoom, layers = 1.0, self.scene
+            if (correction := self.solved.lens_correction) is not None:
+                zoom = correction.zoom
+            else:
+                layers = warps.ideal_layers(layers, self.plan.active, layout.grid)
+            return distances[layers.nearest_at(layout.picture_x / zoom, layout.picture_y / zoom)]
         if isinstance(self.scene, DepthScene):
             return self.scene.depth_at(layout.picture_x, layout.picture_y)
         return np.full(layout.picture_shape, self.solved.scene.distance)

@@ -56,17 +56,10 @@ def check(camera: CameraModel) -> None:
         return
     solved = geometry(camera)
     mapping = lens_mapping(camera, solved)
+    if mapping is not None or optics.lateral_color is not None:
+        _check_distances(camera)
     if mapping is None:
         return
-    if camera.scene.has_distances:
-        key = "projection" if optics.distortion is None else "distortion"
-        key = "prescription" if optics.prescription else key
-        raise bad(
-            ("optics", key),
-            "scenes with depth or layers are not simulated through a lens that distorts: their"
-            " opacities are known on rectangular samples, which distortion would bend",
-            "remove it, or use a flat scene: a chart, an image or a hyperspectral file",
-        )
     x, y = (side / solved.image_distance for side in border(solved))
     u, v = mapping.undistort(x, y)
     angles = np.arctan(np.hypot(u, v))
@@ -89,6 +82,39 @@ def check(camera: CameraModel) -> None:
         " does not reach",
         "make the array smaller, or lengthen the focal length",
     )
+
+
+def _check_distances(camera: CameraModel) -> None:
+    """Refuse distances that are not simulated through a lens that distorts (BadInput).
+
+    Lateral color counts: it magnifies.
+    """
+    optics, scene = camera.optics, camera.scene
+    if not scene.has_distances:
+        return
+    keys = {"distortion": optics.distortion, "lateral_color": optics.lateral_color}
+    key = next((name for name, given in keys.items() if given is not None), "projection")
+    flat = "or use a flat scene: a chart, an image or a hyperspectral file"
+    if optics.prescription:
+        raise bad(
+            ("optics", "prescription"),
+            "images flat scenes: the aberrations of layers and of depth at other distances are not"
+            " traced",
+            f"give focal_length, f_number and distortion instead, {flat}",
+        )
+    if scene.has_depth:
+        raise bad(
+            ("optics", key),
+            "a map of depth is not simulated through a lens that displaces light: it is cut into"
+            " layers on its rectangular samples, which the lens would bend",
+            f"remove it, describe the scene by layers, {flat}",
+        )
+    if scene.moves:
+        raise bad(
+            ("optics", key),
+            "layers in motion are not simulated through a lens that displaces light",
+            f"remove it or the motion, {flat}",
+        )
 
 
 def border(geometry: Geometry) -> tuple[Array, Array]:

@@ -18,10 +18,7 @@ from vcam_cli.effects.temporal.motion import EvenMotion
 from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.image_formation.layers.ray_cells import BORDER, Window
 from vcam_cli.image_formation.optical_path import LayerOptics
-from vcam_cli.scenes.layered import LayerChart
-
-EVEN = 1e-5
-"""Variance within a pixel below which opacity is even there: twice the rounding of its square."""
+from vcam_cli.scenes.layered import EVEN, LayerChart
 
 
 def ray_reach(optics: LayerOptics) -> tuple[float, float]:
@@ -110,7 +107,6 @@ def _opacity_range(
     """Return the least and the largest opacity (rows, columns) that rays of each pixel meet."""
     from scipy.ndimage import maximum_filter, minimum_filter
 
-    cover, center = chart.cover, chart.center
     far, centers = ray_reach(optics), pixel_centers(g, detector=True)
     edges, around = [], []
     for at, pitch, cells, reach in zip(
@@ -120,11 +116,7 @@ def _opacity_range(
         first = at[0] + (cells.start - beyond - 0.5) * pitch
         edges.append(first + np.arange(cells.stop - cells.start + 2 * beyond + 1) * pitch)
         around.append(beyond)
-    one = np.ones((1, 1), cover.picture.dtype)
-    x, y = edges[0] - center[0], edges[1] - center[1]
-    mean, square = (chart.averages(x, y, one)[0] for chart in (cover, cover.squared))
-    uneven = square - np.square(mean) > EVEN
+    low, high = chart.opacity_ends(*edges)
     inner = tuple(slice(n, -n) for n in around[::-1])
     size = tuple(2 * n + 1 for n in around[::-1])
-    high = maximum_filter(np.where(uneven, cover.picture.max(), mean), size)[inner]
-    return minimum_filter(np.where(uneven, 0, mean), size)[inner], high
+    return minimum_filter(low, size)[inner], maximum_filter(high, size)[inner]
