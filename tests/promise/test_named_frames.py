@@ -22,6 +22,7 @@ import pytest
         ("moved", "200218"),  # lobes of coarse samples below zero: light is clipped there
         ("moved", "100068"),  # 1.1 T: their transfer ends with a jump, not along a table
         ("layers", "100008"),  # 1.5 T: halves and thirds of a pixel, gaps among them, agreed
+        ("layers", "200009"),  # 3.1 T: gaps of three fifths of a pixel as one cell
         ("layers", "100039"),  # 1.02 T: of 20 pixels two sums differed by little
     ],
 )
