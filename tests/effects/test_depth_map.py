@@ -18,7 +18,7 @@ from layered_reference import (
     slope_sum,
     write_exr,
 )
-from making import QUIET, camera, radiance_for
+from making import QUIET, camera, long_except, radiance_for
 
 from vcam_cli import simulate
 from vcam_cli.errors import BadInput
@@ -70,7 +70,7 @@ def planes(rng, distances: list[float], focus: float, even: bool) -> Scene:
     return Scene(tuple(layers), focus)
 
 
-@pytest.mark.parametrize("focus", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("focus", long_except([1.0], [0.5, 1.0, 2.0]))
 def test_two_planes_are_two_layers(focus, tmp_path):
     """Both ways of writing agree with the rays, and closer with each other."""
     scene = planes(np.random.default_rng(1), [0.5, 2.0], focus, even=True)
@@ -107,7 +107,7 @@ def test_three_planes_are_three_layers(tmp_path):
     assert error(found, ray_sum(scene, 500, 4)) <= 0.3 * STANDARD
 
 
-@pytest.mark.parametrize("focus", [0.5, 3.0])
+@pytest.mark.parametrize("focus", long_except([3.0], [0.5, 3.0]))
 def test_a_slope_is_a_sum_over_rays(focus, tmp_path):
     """Off by about as much as was predicted; without depth by ten times as much."""
     light = patches(np.random.default_rng(1), 320)

@@ -140,7 +140,10 @@ def test_far_margins_are_covered():
     assert planes.min() > 0.05
 
 
-@pytest.mark.parametrize(("parts", "far"), [(4.3, True), (11.7, True), (32.2, False)])
+@pytest.mark.parametrize(
+    ("parts", "far"),
+    [pytest.param(4.3, True, marks=pytest.mark.long), (11.7, True), (32.2, False)],
+)
 def test_averages_from_sums_over_one_period(parts, far, monkeypatch):
     """Cells far beyond the period, and large ones within it, against their exact parts.
 

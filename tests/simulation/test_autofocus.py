@@ -213,7 +213,7 @@ MASKED = {
 @pytest.mark.parametrize(
     ("defocus", "changes"),
     [
-        ("40 um", {}),
+        pytest.param("40 um", {}, marks=pytest.mark.long),
         ("-60 um", {}),
         pytest.param(
             *("40 um", {"array.pattern": "bayer-rggb", "scene.illuminant": "D65"}),

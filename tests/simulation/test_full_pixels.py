@@ -37,7 +37,7 @@ def left_out(made: Camera) -> set[str]:
     return {d.name for d in prepare(made, 1)[0].plan.decisions if d.state == "off"}
 
 
-@pytest.mark.parametrize("chart", CHARTS)
+@pytest.mark.parametrize("chart", long_except(CHARTS.keys() - {"dead-leaves with a card"}, CHARTS))
 def test_no_place_is_darker_than_a_chart_says(chart, tmp_path):
     """In any color, relative to the perfect white in it."""
     ready = prepare(before(chart, tmp_path, {}), 1)[0]
