@@ -13,10 +13,10 @@ run: $(VENV)/.runtime  ## simulate the shipped still life: out/still-life/
 	$(BIN)/vcam run $(CAMERA)
 
 test: $(VENV)/.dev  ## the tests, but for those that take long
-	$(BIN)/python -m pytest -q -n auto --dist worksteal -m "not long" tests
+	$(BIN)/python -m pytest -q -n logical --dist worksteal -m "not long" tests
 
 test-all: $(VENV)/.dev  ## all tests
-	$(BIN)/python -m pytest -q -n auto --dist worksteal tests
+	$(BIN)/python -m pytest -q -n logical --dist worksteal tests
 
 lint: $(VENV)/.dev  ## format, lint, spelling, types
 	$(BIN)/ruff format --check $(SOURCES)
@@ -53,7 +53,7 @@ figures: $(VENV)/.dev  ## figures and tables of README.md and docs/ that change 
 
 fuzz: $(VENV)/.dev  ## twenty thousand camera and study files with something broken in them
 	$(BIN)/python -m tests.hostile
-	VCAM_FUZZ=40 $(BIN)/python -m pytest -q -n auto tests/hostile/test_random_cameras.py
+	VCAM_FUZZ=40 $(BIN)/python -m pytest -q -n logical tests/hostile/test_random_cameras.py
 
 attacks: $(VENV)/.dev  ## all attacks of tests/hostile, counted in docs/attacks.md
 	$(BIN)/python tests/hostile/attacks.py

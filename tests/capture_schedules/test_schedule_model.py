@@ -8,7 +8,6 @@ import pytest
 from pydantic import ValidationError
 
 from vcam_cli.capture_schedules.model import ScheduleStudy
-from vcam_cli.commands import schemas
 from vcam_cli.config import shipped, validation_messages
 from vcam_cli.config.yaml_reader import read_file
 
@@ -18,7 +17,9 @@ SEGMENTS = [
     {"min": 0.6, "max": 1, "probability": 0.2},
 ]
 SENSOR = {"well_capacity": "20000 e"}
-SCHEMA = jsonschema.Draft202012Validator(schemas.schemas()["study.schema.json"])
+SCHEMA = jsonschema.Draft202012Validator(
+    json.loads((shipped.schemas() / "study.schema.json").read_text("utf-8"))
+)
 
 
 def study(**changes):

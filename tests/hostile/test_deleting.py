@@ -15,7 +15,7 @@ from making import long_except, tree
 from typer.testing import CliRunner
 
 from vcam_cli.commands import main
-from vcam_cli.commands.schemas import schemas
+from vcam_cli.config import shipped
 from vcam_cli.errors import BadInput
 from vcam_cli.files.atomic import STAGING, write_text
 from vcam_cli.files.folder import OutputFolder
@@ -186,7 +186,7 @@ def vcam(*args: str | Path):
     return CliRunner().invoke(main.app, [str(a) for a in args], prog_name="vcam")
 
 
-SCHEMAS = schemas()
+SCHEMAS = {p.name: json.loads(p.read_text("utf-8")) for p in sorted(shipped.schemas().iterdir())}
 
 
 @pytest.mark.parametrize("name", long_except([min(SCHEMAS), max(SCHEMAS)], SCHEMAS))
