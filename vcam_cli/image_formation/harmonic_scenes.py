@@ -53,16 +53,10 @@ def wave_layers(path: OpticalPath, scene: WaveScene) -> tuple[Layers, SpectrumRe
         Changes by leaving out effects.
     """
     x, y = pixel_centers(path.geometry, detector=True)
-    (drift_x, drift_y), (moved_x, moved_y) = path.drift, path.displacement
-    first = path.geometry.collecting_y  # rows are read one after the other, not photodetectors
 
     def shape(w: Wave) -> tuple[Array, Array]:
-        skew = w.fy * drift_y + w.fx * drift_x
-        turns = w.fx * (x - moved_x) - w.fy * moved_y + skew * first
-        return (
-            np.exp(1j * (2 * np.pi * turns + w.phase)),
-            np.exp(2j * np.pi * (w.fy - skew) * y),
-        )
+        turns, slope = path.seen_along((w.fx, w.fy))
+        return np.exp(1j * (2 * np.pi * turns + w.phase)), np.exp(2j * np.pi * slope * y)
 
     shapes = [shape(w) for w in scene.waves]
 

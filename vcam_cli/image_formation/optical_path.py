@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.devices.processor import PROCESSOR, Processor
 from vcam_cli.effects.base import Effect, of_kind
@@ -148,6 +148,31 @@ class OpticalPath:
         """Displacement of the image in the array's middle, along x and y [m]."""
         moved = [motion.displacement for motion in of_kind(self.effects, ImageMotion)]
         return sum(x for x, _ in moved), sum(y for _, y in moved)
+
+    def seen_along(self, direction: tuple[float, float]) -> tuple[Array, float]:
+        """Return the part of the columns in what pixels see along a direction, and the rows' slope.
+
+        A pixel at (x, y) sees the place of the image whose product with the direction is the part
+        of its column and the slope times y.
+
+        Parameters
+        ----------
+        direction : tuple of float
+            Factors (a, b) of places to the right and downwards.
+
+        Returns
+        -------
+        columns : Array
+            Parts (columns,): a times lengths, and what is the same for all pixels.
+        slope : float
+            Factor of y, where photodetectors collect light: b, less where the image drifts.
+        """
+        g, (a, b) = self.geometry, direction
+        x, _ = pixel_centers(g, detector=True)
+        (drift_x, drift_y), (moved_x, moved_y) = self.drift, self.displacement
+        skew = b * drift_y + a * drift_x
+        # Rows are read one after the other, wherever in its pixel a photodetector is.
+        return a * (x - moved_x) - b * moved_y + skew * g.collecting_y, b - skew
 
     @property
     def is_displaced(self) -> bool:

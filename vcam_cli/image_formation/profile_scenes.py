@@ -262,14 +262,10 @@ class EdgeImage:
 
         With them, (columns,) and (rows,), comes whether rows differ.
         """
-        x, y = pixel_centers(self.path.geometry, detector=True)
-        (drift_x, drift_y), (moved_x, moved_y) = self.path.drift, self.path.displacement
-        across_x, across_y = self.profile.across
-        g, skew = self.path.geometry, across_y * drift_y + across_x * drift_x
-        down = across_y - skew
+        g = self.path.geometry
+        _, y = pixel_centers(g, detector=True)
+        along, down = self.path.seen_along(self.profile.across)
         differ = abs(down) * math.hypot(g.sensor_width, g.sensor_height) > 1e-9 * g.pitch_y
-        # Rows are read one after the other, wherever in its pixel a photodetector is.
-        along = across_x * (x - moved_x) - across_y * moved_y + skew * g.collecting_y
         return along, down * y if differ else np.zeros(len(y)), differ
 
     def changes(self) -> dict[str, float]:
