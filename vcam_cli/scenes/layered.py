@@ -60,17 +60,19 @@ class MaskedChart(Chart):
         (columns, across, x_inside), (rows, down, y_inside) = self.opacity.inside(x_edges, y_edges)
         if not len(across) or not len(down):
             return
-        borders = self.opacity.sample_borders(x_inside, y_inside)
-        x, y = (_with_borders(*both) for both in zip((x_inside, y_inside), borders, strict=True))
+        x, y, even = x_inside, y_inside, self.opacity.is_even
+        if not even:
+            borders = self.opacity.sample_borders(x, y)
+            x, y = (_with_borders(*both) for both in zip((x, y), borders, strict=True))
         middle, first = (x[1:] + x[:-1]) / 2, np.searchsorted(y, y_inside)
         few = max(1, len(down) * MOST_PARTS // ((len(x) - 1) * (len(y) - 1)))
         for some in pieces(len(down), few):
             here = y[first[some.start] : first[some.stop] + 1]
             seen = self.light.averages(x, here, mix[:, :-1])
             seen += mix[:, -1, None, None]
-            seen *= self.opacity.values(
-                middle, (here[1:] + here[:-1]) / 2, np.ones((1, 1), mix.dtype)
-            )
+            at = slice(1) if even else slice(None)
+            between = (here[1:] + here[:-1]) / 2
+            seen *= self.opacity.values(middle[at], between[at], np.ones((1, 1), mix.dtype))
             found = means_of_parts(seen, (here, x), (_edges(y_inside, some), x_inside))
             found *= np.outer(down[some], across).astype(mix.dtype)
             out[:, rows, columns][:, some] = found

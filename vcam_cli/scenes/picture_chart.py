@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,11 @@ class PictureChart(Chart):
     def brightest(self) -> float:
         """Brightest light, relative to the perfect white."""
         return float(self.picture.max())
+
+    @cached_property
+    def is_even(self) -> bool:
+        """Whether all samples are the same."""
+        return bool((self.picture == self.picture[0, 0]).all())
 
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
         """Write the exact averages over the cells."""

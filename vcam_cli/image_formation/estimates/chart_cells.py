@@ -257,19 +257,28 @@ class CellError:
 
     def _of_oblique(self, side: float) -> float:
         """Return the same for edges of all directions."""
-        f = (np.arange(FREQUENCIES) + 0.5) * (self.top / FREQUENCIES)
-        fx, fy = np.meshgrid(f, f)
-        passed = self._passed(fx, fy)
-        x, y = np.minimum(fx * side, 0.5), np.minimum(fy * side, 0.5)
-        folded = np.zeros_like(fx)
-        for k, m in product((0, *FOLDS), repeat=2):
+        f, passed, own = self._oblique_table
+        turns = np.minimum(f * side, 0.5)
+        contrasts = {k: np.square(_folded(turns, k)) for k in (0, *FOLDS)}
+        folded = np.zeros_like(passed)
+        for k, m in product(contrasts, repeat=2):
             if k or m:
-                length = 2 * np.pi * np.hypot(x + k, y + m) / side
-                folded += (_folded(x, k) * _folded(y, m)) ** 2 * 2 / length**3
-        own = 2 / (2 * np.pi * np.hypot(fx, fy)) ** 3
-        inside = np.maximum(x, y) < 0.5
+                length = np.hypot(turns + k, (turns + m)[:, None])
+                folded += contrasts[k] * contrasts[m][:, None] / length**3
+        folded *= 2 * (side / (2 * np.pi)) ** 3
+        inside = np.maximum(turns, turns[:, None]) < 0.5
         area = 4 * (self.top / FREQUENCIES) ** 2
         return float((passed * np.where(inside, folded, own)).sum()) * area
+
+    @cached_property
+    def _oblique_table(self) -> tuple[Array, Array, Array]:
+        """Frequencies (n,) along each axis [cycles/m], and at pairs of them (n, n) two factors.
+
+        They are the squared transfer, and the energy of edges of all directions of energy 1 [m].
+        """
+        f = (np.arange(FREQUENCIES) + 0.5) * (self.top / FREQUENCIES)
+        fx, fy = np.meshgrid(f, f)
+        return f, self._passed(fx, fy), 2 / (2 * np.pi * np.hypot(fx, fy)) ** 3
 
 
 FOLDS = (-2, -1, 1, 2)
