@@ -13,6 +13,7 @@ from optical_paths import aperture, path, sensor
 from vcam_cli import simulate
 from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.image_formation.layers import layered, ray_windows
+from vcam_cli.image_formation.layers.layer_edges import _extremes
 from vcam_cli.image_formation.layers.occlusion import RayLayer, covariance, rays
 from vcam_cli.image_formation.layers.ray_cells import Cells, SharpImage, Window
 from vcam_cli.image_formation.layers.ray_windows import LEVELS, _Sum, _too_coarse, windows_with
@@ -184,6 +185,14 @@ def test_waves_diffract_from_rays_between_pairs_of_points(period, angle, rings, 
     expected = np.broadcast_to(expected if angle == 0 else expected[:, None], (16, 16))
     np.testing.assert_allclose(light[0, 0], expected, atol=error)
     np.testing.assert_allclose(cover[0, 0], expected, atol=error)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (2, 3), (9, 17), (40, 1)])
+def test_extremes_are_those_of_every_window(size):
+    plane = np.random.default_rng(1).random((40, 50))
+    windows = np.lib.stride_tricks.sliding_window_view(plane, size)
+    for larger, expected in ((np.maximum, windows.max((2, 3))), (np.minimum, windows.min((2, 3)))):
+        np.testing.assert_array_equal(_extremes(larger, plane, size), expected)
 
 
 @pytest.mark.parametrize("divided", [(1.0, 1.0), (0.6, 1.0), (0.3, 0.85)])
