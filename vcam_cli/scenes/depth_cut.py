@@ -34,8 +34,8 @@ FINEST = 2e-5
 BETWEEN = math.sqrt(8 / 15)
 """Rms over all places between two layers of an error that is largest in the middle, 4 t (1 - t)."""
 LEAST_JUMP = 0.1
-"""Difference of blur radii above which one sample hides another [pixels]. At `standard` random depths
-then err by 1e-3 of full signal, by 6e-4 with half of it, and with ten times as much by 2e-2."""
+"""Difference of blur radii above which one sample hides another [pixels]. At `standard` random
+depths then err by 1e-3 of full signal, by 6e-4 with half of it, by 2e-2 with ten times as much."""
 STEPS = 24
 """Groups of radii, each searched at once for the background behind it. A matter of cost: with 12 to
 200 random depths change by less than 1e-4 of full signal."""
