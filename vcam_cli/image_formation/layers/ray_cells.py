@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 import scipy.fft
@@ -282,14 +283,18 @@ class SharpImage:
         light, cover : Array
             Values (n, C, rows, columns) and (m, C, rows, columns) at the pixels.
         """
-        found = self._means if self._lens is None else self._waves
-        light, cover = (self._collected(cells, image) for image in found(cells, groups))
+        every = iter(groups)
+        first, second = next(every), next(every, None)
+        if second is None:
+            images = self._means(cells, first)
+        else:
+            images = self._waves(cells, chain([first, second], every))
+        light, cover = (self._collected(cells, image) for image in images)
         return light, np.broadcast_to(cover, (len(cover), *light.shape[1:]))
 
-    def _means(self, cells: Cells, groups: Iterable[Sums]) -> tuple[Array, Array]:
+    def _means(self, cells: Cells, group: Sums) -> tuple[Array, Array]:
         """Return images (n, C, h, w) and (m, C or 1, h, w) where every ray counts alike."""
-        (rays, light, cover), *none = groups
-        assert not none
+        rays, light, cover = group
         light, cover = light / len(rays), cover[:, None] / len(rays)
         if self.is_local:
             return light, cover
@@ -301,7 +306,7 @@ class SharpImage:
         return light, cover
 
     def _waves(self, cells: Cells, groups: Iterable[Sums]) -> tuple[Array, Array]:
-        """Return the same behind a lens that diffracts: at each frequency of the rays it passes."""
+        """Return the same of several groups: at each frequency of the rays that it passes."""
         light: Array | float = 0.0
         cover: Array | float = 0.0
         passed: Array | float = 0.0
