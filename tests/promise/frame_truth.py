@@ -94,8 +94,10 @@ def exposure_time(camera: Camera, own: Setup, photo: np.ndarray) -> float:
     else:
         place = math.ceil(auto.percentile / 100 * photo.size) - 1
         level = float(np.sort(photo, axis=None)[max(place, 0)])
-    wanted = auto.target * full_well(camera) / (level / own.time + own.dark_rate)
-    return min(max(wanted, auto.min), auto.max)
+    rate = level / own.time + own.dark_rate
+    if rate == 0:  # no time is long enough
+        return auto.max
+    return min(max(auto.target * full_well(camera) / rate, auto.min), auto.max)
 
 
 # --- the camera as numbers -----------------------------------------------------------------------
