@@ -159,19 +159,22 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
     def _harmonics_at_nodes(self, frequency: Array) -> Array:
         """Return the harmonics (nodes, n, m), between the entries of a table up to their end.
 
-        Light in parts of the spectrum, and further frames through the lens, share the table.
+        Light in parts of the spectrum, and further frames through the lens, share the table. Rays
+        cost as much for each frequency: few are computed without one.
         """
         step = 1 / (STEPS_PER_PERIOD * self.reach)
-        key = self.wavefront.field, self.wavefront.place, self.diffracts, self.color
+        at = np.minimum(frequency, self._end)
+        count = math.ceil((self._end if self.diffracts else float(at.max())) / step) + STENCIL
+        if not self.diffracts:
+            few, places = np.unique(at, return_inverse=True)
+            if len(few) < count // 2:
+                return self._direct_harmonics(few)[:, places]
+        key = self.wavefront.field, self.wavefront.place, self.diffracts, self.color, count
         table = _HARMONICS.get(
             (*key, self.shortest, self.longest),
-            lambda: self._table(step),
+            lambda: self._direct_harmonics(step * np.arange(count)).astype(np.complex64),
         )
-        return _between(table, np.minimum(frequency, self._end) / step)
-
-    def _table(self, step: float) -> Array:
-        count = math.ceil(self._end / step) + STENCIL
-        return self._direct_harmonics(step * np.arange(count)).astype(np.complex64)
+        return _between(table, at / step)
 
     @property
     def _end(self) -> float:
