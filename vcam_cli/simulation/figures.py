@@ -153,7 +153,7 @@ def gray_snr_db(frame: Frame) -> float:
     layout, colors = frame.layout, len(frame.mosaic.colors)
     counts = np.ones(colors)
     if not layout.full_color:
-        counts = np.bincount(layout.color.ravel(), minlength=colors).astype(float)
+        counts = np.array([np.count_nonzero(layout.color == color) for color in range(colors)])
     signal = GRAY * frame.white_rate * frame.exposure_time
     usable = signal + frame.dark_rate * frame.exposure_time < frame.chain.saturation
     weights = counts * usable
@@ -184,12 +184,12 @@ def edge_mtf50(frame: Frame) -> float:
         Frequency [cycles/pixel]; nan where no edge is found, inf where the MTF stays above one
         half.
     """
-    layout, codes = frame.layout, frame.chain.linear(frame.picture_dn)
+    layout, plane = frame.layout, frame.picture_dn
     if layout.full_color:
-        plane = codes[int(frame.white_rate.argmax())]
+        plane = plane[int(frame.white_rate.argmax())]
         parts = [(slice(None), slice(None))]
     else:
-        plane, mosaic = codes, layout.raw_mosaic
+        mosaic = layout.raw_mosaic
         block = np.array(mosaic.block)
         counts = [int((block == name).sum()) for name in mosaic.colors]
         color = max(zip(counts, frame.white_rate, mosaic.colors, strict=True))[2]
@@ -199,7 +199,10 @@ def edge_mtf50(frame: Frame) -> float:
             for i, j in np.argwhere(block == color)
         ]
     x, y = layout.centers
-    lattices = [mtf.Lattice(plane[rows, columns], x[columns], y[rows]) for rows, columns in parts]
+    lattices = [
+        mtf.Lattice(frame.chain.linear(plane[rows, columns]), x[columns], y[rows])
+        for rows, columns in parts
+    ]
     pitch = min(layout.geometry.pitch_x, layout.geometry.pitch_y)
     try:
         return mtf.slanted_edge_sfr(lattices, pitch, EDGE_REACH * pitch).mtf50 * pitch
@@ -296,7 +299,8 @@ def _clipped(frame: Frame) -> dict[str, float]:
     full, colors = saturated_pixels(frame), frame.mosaic.colors
     if frame.layout.full_color:
         return {name: float(plane.mean()) for name, plane in zip(colors, full, strict=True)}
-    counts = np.bincount(frame.layout.color.ravel(), minlength=len(colors))
-    clipped = np.bincount(frame.layout.color.ravel(), weights=full.ravel(), minlength=len(colors))
-    shares = clipped / np.maximum(counts, 1)
-    return dict(zip(colors, shares.tolist(), strict=True))
+    shares = {}
+    for number, name in enumerate(colors):  # numbers of 64 bits for all pixels would be the peak
+        own = frame.layout.color == number
+        shares[name] = int(np.count_nonzero(full & own)) / max(int(np.count_nonzero(own)), 1)
+    return shares
