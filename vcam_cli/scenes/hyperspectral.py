@@ -31,8 +31,8 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.scene.illuminant import IlluminantSpec
 from vcam_cli.camera.scene.scene import Scene
 from vcam_cli.errors import bad
+from vcam_cli.parallel import each, pieces
 from vcam_cli.scenes import light
-from vcam_cli.scenes.bands import bands_of_rows, paint_by_bands
 from vcam_cli.scenes.base import View
 from vcam_cli.scenes.image import ImageScene, image_scene
 from vcam_cli.spectra import Spectrum, Table, integral, luminance
@@ -90,10 +90,9 @@ class StoredSamples:
 
     @property
     def nbytes(self) -> int:
-        """Memory of reading the largest strip [bytes]."""
+        """Memory of reading the largest strip, and of its copy in other units [bytes]."""
         rows, columns, bands = self.shape
-        strip = bands_of_rows(rows, columns)[0].stop
-        return READER + int(strip * columns * bands * self.dtype.itemsize)
+        return READER + 2 * int(min(rows, ROWS) * columns * bands * self.dtype.itemsize)
 
     def __len__(self) -> int:
         return self.shape[0]
@@ -168,7 +167,7 @@ class CubeScene(ImageScene):
             block = self.picture[rows].reshape(-1, bands).astype(self.dtype, copy=False)
             inside[:, rows] = (block @ weights).T.reshape(len(mix), -1, width)
 
-        paint_by_bands(paint, height, width, workers)
+        each(paint, pieces(height, ROWS), workers)
         return out
 
     def _largest(self, samples: Array) -> float:
