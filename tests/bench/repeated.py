@@ -196,13 +196,16 @@ def _forecasts() -> dict[str, Row]:
         }
         size = f"array.rows={rows}", f"array.columns={columns}", "quality=[]"
         wavelengths = "scene.wavelengths={start: 400 nm, stop: 700 nm}"
-        found = {}
+        charts = "siemens-star", "dead-leaves", "colorchecker", "slanted-edge", "eye-chart"
+        sources |= {f"the chart {chart}": f"{{chart: {chart}}}" for chart in charts}
+        out = folder / "out"
+        found = {"layers of `table-top`": {"ratio": forecast_ratio("table-top", size, out)}}
         for what, source in sources.items():
             camera, sets = "starter", (*size, f"scene.source={source}")
             if "cube" in what:  # it has light of its own
                 camera = str(_without_lamp(folder / "camera.yaml"))
                 sets = (*sets, wavelengths, "scene.luminance=100 cd/m2")
-            found[what] = {"ratio": forecast_ratio(camera, sets, folder / "out")}
+            found[what] = {"ratio": forecast_ratio(camera, sets, out)}
     return found
 
 

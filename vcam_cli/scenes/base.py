@@ -275,6 +275,8 @@ class Chart(ABC):
 
     edge_seconds: ClassVar[float] = 0.0
     """Core seconds to find the edges that a frame sees, whatever its cells; see `cost_model`."""
+    cell_bytes: ClassVar[int] = 0
+    """Memory of temporary arrays for each cell that is painted at once, beside its values."""
     undivided: ClassVar[float] = math.inf
     """Largest width of cells that are painted as they are; wider ones are painted in parts [m]."""
 

@@ -48,6 +48,7 @@ class MaskedChart(Chart):
     """0 where there is nothing."""
 
     edge_seconds = property(lambda self: self.light.edge_seconds)
+    cell_bytes = property(lambda self: self.light.cell_bytes)
 
     @property
     def brightest(self) -> float:
@@ -121,6 +122,7 @@ class LayerChart(Chart):
 
     edge_seconds = property(lambda self: self.layer.edge_seconds)
     undivided = property(lambda self: self.layer.undivided)
+    cell_bytes = property(lambda self: self.layer.cell_bytes)
 
     @property
     def brightest(self) -> float:

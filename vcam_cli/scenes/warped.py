@@ -66,6 +66,8 @@ LOOKS, LOOKS_IN_TILE = 33, 5
 """Places along each side of a map, and of a tile, at which its scale is looked at."""
 TINY = 1e-30
 """Less than any second moment that counts."""
+SQUARES = 200
+"""Temporary arrays for each cell whose squares are painted, as measured [bytes]."""
 CORNERS = ((-1, -1), (-1, 1), (1, -1), (1, 1))
 """Signs of the ways to four squares."""
 PAIRS = ((0, 0), (1, 1), (0, 1))
@@ -239,6 +241,7 @@ class WarpedChart(Chart):
     on the sensor [m2]."""
 
     edge_seconds = property(lambda self: self.chart.edge_seconds)
+    cell_bytes = property(lambda self: self.chart.cell_bytes + SQUARES)
     undivided = property(lambda self: min(self.chart.undivided / self.sees.scales[1], self.widest))
 
     @property

@@ -372,7 +372,7 @@ def _require_memory(solved: Solved) -> int:
     scattered = array.rows * array.columns if layout.is_scattered else 0
     judged = bool(solved.quality)
     needed = memory_model.frame_bytes(
-        layout.lattice, solved.settings, colors, judged, samples, scattered
+        layout.lattice, solved.settings, colors, judged, samples, scattered, _edge_pixels(solved)
     )
     if "s-cielab" in solved.quality:
         shape = layout.picture_shape
@@ -381,6 +381,17 @@ def _require_memory(solved: Solved) -> int:
         needed += scielab.needed_bytes(shape, screen, solved.display.filters, 1)
     memory.require(needed, array.rows, array.columns)
     return needed
+
+
+def _edge_pixels(solved: Solved) -> int:
+    """Return the most pixels of a color of which the response of a slanted edge is found."""
+    if not solved.has_edge:
+        return 0
+    pixels = solved.geometry.rows * solved.geometry.columns
+    if solved.layout.full_color:
+        return pixels
+    block = [name for row in solved.layout.raw_mosaic.block for name in row]
+    return pixels * max(map(block.count, block)) // len(block)
 
 
 def _scene(

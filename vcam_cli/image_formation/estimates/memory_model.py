@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.blurs import PlaneTransfer
@@ -26,8 +28,9 @@ from vcam_cli.physics.pupil_harmonics import MOST
 from vcam_cli.scenes.bands import bands_of_rows
 from vcam_cli.scenes.base import ChartScene, SampledScene
 
-BASE = 180_000_000
-"""Interpreter and libraries of `vcam run`; a call of the library takes 40 MB less [bytes]."""
+BASE = 150_000_000
+"""Interpreter and libraries of `vcam run`, 132 to 145 MB; a call of the library takes
+40 MB less [bytes]."""
 JUDGED = 22
 """What comparing an image with the ideal one takes for each color of a pixel [bytes]."""
 SLACK = 1.1
@@ -35,8 +38,18 @@ SLACK = 1.1
 FEW_HARMONICS = 64
 """Harmonics of the direction of wavefronts of few waves: up to 73 are seen where slopes are
 steepest, half as many in the mean over the rings."""
-WORK = 24_000_000
-"""Temporary arrays of one thread [bytes]."""
+WORK, WORK_OF_TRANSFER, WORK_OF_PIXEL = 12_000_000, 1_000_000, 16
+"""Temporary arrays of one thread, for each transfer of a mixture in a color besides, and for a
+pixel of small arrays at most [bytes]."""
+PERIOD = 110_000_000
+"""Cells of one period of leaves and their sums, from which the wide cells of rings are read, as
+measured before 24 x 32 pixels [bytes]."""
+EDGE = 46
+"""Of a pixel that the response of a slanted edge is found from: codes, distances from the edge, and
+their order, as measured [bytes]."""
+RAYS = 30_000_000
+"""Rays between layers that are summed together, as measured before `table-top` at three sizes
+[bytes]."""
 SCATTERED = 120
 """Pixel at a place of its own: positions, samples by color, the tree in which its neighbors are
 found [bytes]."""
@@ -80,10 +93,20 @@ def image_bytes(
     waves = (2 if g.collecting_x else 1) * (2 if g.collecting_y else 1)
     waves = 4 if path.transfer.plane_blurs else waves
     series = colors * (waves + (2 if path.field_rings else 0))
-    near = width * _values(path, scene, (highest, filtered), planes, series)
-    far = [8 * _values(path, part.scene, (highest, filtered), planes, series) for part in rings]
-    held = max([near, *far]) + g.rows * g.columns * width
-    return BASE + round(SLACK * held) + WORK * path.workers
+    parts = [(width, scene), *((8, part.scene) for part in rings)]
+    painted = held = 0
+    for each, part in parts:
+        samples = each * _samples(path, part, highest, planes)
+        held = max(held, samples + each * series * _series(path, part, filtered))
+        at_once = _painting_bytes(path, part, each * planes)
+        if part is not scene and isinstance(part, ChartScene) and part.chart.edge_seconds:
+            at_once += PERIOD
+        painted = max(painted, round(SLACK * samples) + at_once)
+    pixels = g.rows * g.columns
+    filtering = round(SLACK * (held + pixels * width)) + work_bytes(
+        pixels, path.workers, planes * colors
+    )
+    return BASE + max(filtering, painted)
 
 
 def device_bytes(path: OpticalPath, scene: SampledScene, highest: float, planes: int) -> int:
@@ -160,26 +183,82 @@ def table_bytes(path: OpticalPath, planes: int, size: TableSize) -> int:
     return of_blurs + of_field
 
 
-def _values(
-    path: OpticalPath, scene: SampledScene, ends: tuple[float, float], planes: int, series: int
-) -> int:
-    """Numbers that a scene's spectrum and the given count of pixels' series take.
-
-    Where folding is exact a series has as many terms as the scene has pixels, its margin included.
-    The spectrum and the series go up to the two `ends` [pixel Nyquist].
-    """
-    g, terms = path.geometry, axes(path, scene, ends[0])[0].terms
-    x, y = axes(path, scene, ends[1])
+def _samples(path: OpticalPath, scene: SampledScene, highest: float, planes: int) -> int:
+    """Numbers that a scene and its spectrum up to a frequency [pixel Nyquist] take."""
     rows, columns = scene.shape
     if not isinstance(scene, ChartScene):
-        samples = planes * rows * columns
-    elif not scene.is_painted:
-        samples = 4 * g.rows * g.columns
-    else:  # painted in bands; terms along x are kept
-        bands = columns * bands_of_rows(rows, columns)[0].stop * path.workers
-        samples = planes * (rows * terms + bands)
-    evaluated = g.rows * x.folded_terms if y.virtual_pixels is None else 0
-    return samples + series * (y.folded_terms * x.folded_terms + evaluated)
+        return planes * rows * columns
+    x, y = axes(path, scene, highest)
+    if scene.is_painted:  # in bands; terms along x are kept
+        return planes * rows * x.terms
+    if scene.chart.separates:
+        return 0  # few functions of one variable
+    found = scene.rectangles(np.zeros((1, len(scene.spectra))))
+    assert found is not None
+    down, along = len(found.y) - 1, len(found.x) - 1
+    # Terms of every run along both axes in 64 bits, and along x for each row of rectangles.
+    return 2 * (down * y.terms + along * x.terms) + planes * down * x.terms
+
+
+def _painting_bytes(path: OpticalPath, scene: SampledScene, width: int) -> int:
+    """Memory of bands of cells while they are painted, with `width` bytes a cell."""
+    if not (isinstance(scene, ChartScene) and scene.is_painted):
+        return 0
+    rows, columns = scene.shape
+    band = int(columns * bands_of_rows(rows, columns)[0].stop)
+    return path.workers * band * (width + scene.chart.cell_bytes)
+
+
+def _series(path: OpticalPath, scene: SampledScene, highest: float) -> int:
+    """Numbers of one series of a scene's light up to a frequency [pixel Nyquist].
+
+    Where folding is exact it has as many terms as the scene has pixels, its margin included.
+    """
+    x, y = axes(path, scene, highest)
+    evaluated = path.geometry.rows * x.folded_terms if y.virtual_pixels is None else 0
+    return y.folded_terms * x.folded_terms + evaluated
+
+
+def work_bytes(pixels: int, workers: int, transfers: int = 0) -> int:
+    """Return the memory of temporary arrays of all threads.
+
+    Parameters
+    ----------
+    pixels : int
+        Pixels of the array.
+    workers : int
+        Number of threads.
+    transfers : int, optional
+        Mixtures of the scene's components, times colors, that are filtered.
+
+    Returns
+    -------
+    int
+        Bytes.
+    """
+    return workers * min(WORK + transfers * WORK_OF_TRANSFER, WORK_OF_PIXEL * pixels)
+
+
+def composed_bytes(path: OpticalPath, layers: int) -> int:
+    """Return the memory of layers while they are put one before the other.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    layers : int
+        Memory of the light and cover of all layers [bytes].
+
+    Returns
+    -------
+    int
+        Bytes: layers, their sum, what is clear before the next one, a product of it, a bound,
+        and the rays between them.
+    """
+    pixels = path.geometry.rows * path.geometry.columns
+    width, colors = path.settings.float_width // 8, len(path.mosaic.colors)
+    held = layers + (3 * colors + 1) * pixels * width
+    return BASE + RAYS + round(SLACK * held) + work_bytes(pixels, path.workers)
 
 
 def sub_exposure_bytes(geometry: Geometry, knobs: Settings, colors: int) -> int:
@@ -224,6 +303,8 @@ def box_average_bytes(samples: int, planes: int, geometry: Geometry, knobs: Sett
     """
     pixels = geometry.rows * geometry.columns
     width = knobs.float_width // 8
+    if not samples:
+        return BASE + round(SLACK * (planes + 1) * pixels * width) + work_bytes(pixels, 2)
     held = planes * (samples * width + 2 * pixels * (width + 8)) + 5 * 8 * max(samples, pixels)
     return BASE + round(SLACK * held)
 
@@ -235,8 +316,9 @@ def frame_bytes(
     judged: bool,
     samples: int = 0,
     scattered: int = 0,
+    edge: int = 0,
 ) -> int:
-    """Return the memory of a frame without its scene: signal, raw, render.
+    """Return the memory of a frame without its scene: signal, raw, render, figures.
 
     Parameters
     ----------
@@ -252,6 +334,8 @@ def frame_bytes(
         Samples of one integration, of each color that a pixel has; 0 for a single exposure.
     scattered : int, optional
         Pixels that fill no rows and columns and are interpolated on a grid.
+    edge : int, optional
+        Pixels that the response of a slanted edge is found from; 0 without one.
 
     Returns
     -------
@@ -260,9 +344,12 @@ def frame_bytes(
     """
     pixels = geometry.rows * geometry.columns
     width = knobs.float_width // 8
-    frame = pixels * (2 * width + 2 + colors)
+    frame = pixels * (2 * width + 3 + colors)  # rate, electrons, codes, numbers of colors, render
+    # The SNR of the picture has its signal, a copy and a mask.
+    frame += max(pixels * (2 * width + 1), EDGE * edge)
     if samples:  # their electrons and codes, the photocurrent and what is made into a picture
         frame += pixels * (samples * (width + 4) + 8)
     frame += SCATTERED * scattered
     compared = JUDGED * pixels * colors if judged else 0
-    return BASE + max(pixels * width * (colors + 1), frame) + compared
+    held = max(pixels * width * (colors + 1), frame) + compared
+    return BASE + round(SLACK * held) + work_bytes(pixels, 2)

@@ -27,6 +27,7 @@ from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.blurs import Blur, FieldTransfer, SeparableTransfer
 from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.floats import rms
+from vcam_cli.image_formation.estimates import memory_model
 from vcam_cli.image_formation.estimates.bandwidth import margin
 from vcam_cli.image_formation.layers.layer_edges import (
     even_motion,
@@ -156,7 +157,7 @@ def layered_image(
         ray_values=hidden.values,
     )
     layer = Layer(lambda color, rows: light[color, rows])
-    return iter([layer]), _report(layers, error, depth)
+    return iter([layer]), _report(path, layers, error, depth)
 
 
 def _layers_seen(path: OpticalPath, scene: LayeredScene, form: FormImage) -> Iterator[SeenLayer]:
@@ -414,10 +415,14 @@ def is_of_lens(effect: Effect) -> bool:
     return moves or (effect.origin == "lens" and bool(of_kind([effect], Blur, FieldTransfer)))
 
 
-def _report(layers: Sequence[SeenLayer], error: float, depth: DepthReport) -> SpectrumReport:
+def _report(
+    path: OpticalPath, layers: Sequence[SeenLayer], error: float, depth: DepthReport
+) -> SpectrumReport:
     """Return the report on the image of layers, with its error [e/s]."""
     reports = [layer.report for layer in layers]
     names = {name for own in reports for name in own.changes}
+    held = sum(layer.light.nbytes + layer.cover.nbytes for layer in layers)
+    composed = memory_model.composed_bytes(path, held)
     return SpectrumReport(
         oversampling=max((own.oversampling for own in reports), default=0.0),
         lost_rms=error,
@@ -425,7 +430,7 @@ def _report(layers: Sequence[SeenLayer], error: float, depth: DepthReport) -> Sp
             name: math.hypot(*(own.changes.get(name, 0.0) for own in reports)) for name in names
         },
         peak=math.inf,
-        memory=max((own.memory for own in reports), default=0),
+        memory=max([composed, *(own.memory for own in reports)]),
         depth=depth,
         parts=tuple(
             (layer.path.geometry, len(layer.path.mosaic.colors), layer.report) for layer in layers
