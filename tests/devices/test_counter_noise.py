@@ -77,3 +77,12 @@ def test_a_device_needs_its_name_and_memory():
         open_device("tpu")
     with pytest.raises(CannotDo, match="4 frames need about 1e\\+09 GB"):
         require(Processor(), 10**18, "4 frames")
+
+
+def test_smaller_batches_are_a_remedy_of_batches_alone():
+    with pytest.raises(CannotDo) as single:
+        require(Processor(), 10**18, "2 x 3 pixels")
+    with pytest.raises(CannotDo) as several:
+        require(Processor(), 10**18, "4 frames", "smaller batches, ")
+    assert str(single.value).endswith("use fewer pixels (array), or --device cpu")
+    assert str(several.value).endswith("use smaller batches, fewer pixels (array), or --device cpu")

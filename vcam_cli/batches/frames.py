@@ -345,7 +345,8 @@ def _require(
     """Raise CannotDo where a batch does not fit into the memory of the device."""
     g = taker.solved.geometry
     needed = count * frame_bytes(taker) + pictures * light.bytes_per_picture(channels)
-    require(device, needed, f"{count} frames of {g.rows} x {g.columns} pixels")
+    what = f"{count} frames of {g.rows} x {g.columns} pixels"
+    require(device, needed, what, "smaller batches, " if count > 1 else "")
 
 
 def _frame_batch(

@@ -328,9 +328,7 @@ def _device_errors() -> Iterator[None]:
         if not module.startswith("cupy"):
             raise
         out = "OutOfMemory" in type(error).__name__
-        remedy = (
-            "use smaller batches or fewer pixels" if out else "look at the driver and start anew"
-        )
+        remedy = "use fewer pixels at once" if out else "look at the driver and start anew"
         raise CannotDo(
             f"the graphics processor failed: {error}", f"{remedy}, or --device cpu"
         ) from error

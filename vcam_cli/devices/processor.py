@@ -295,7 +295,7 @@ PROCESSOR = Processor()
 """The processor: the device unless another is chosen."""
 
 
-def require(device: Processor, needed: int, what: str) -> None:
+def require(device: Processor, needed: int, what: str, others: str = "") -> None:
     """Raise CannotDo where a device has too little memory.
 
     Parameters
@@ -306,11 +306,18 @@ def require(device: Processor, needed: int, what: str) -> None:
         Memory that is needed [bytes].
     what : str
         What needs it, as a message begins.
+    others : str, optional
+        What helps beside fewer pixels, as in a list: "smaller batches, ".
+
+    Raises
+    ------
+    CannotDo
+        Where it does not fit.
     """
     free = device.free_memory()
     if needed > free:
         raise CannotDo(
             f"{what} need about {needed / 1e9:.3g} GB of the device's memory; {free / 1e9:.3g} GB"
             f" ({100 * SHARE:g} % of what is free) may be used",
-            "use smaller batches, fewer pixels (array), or --device cpu",
+            f"use {others}fewer pixels (array), or --device cpu",
         )
