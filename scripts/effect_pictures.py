@@ -270,8 +270,8 @@ EXAMPLES = {
         "3 % of the pixels have a trap that shifts them by 30 electrons.",
     ),
     "adc_noise": Example(
-        _noise("adc.noise=3 DN"),
-        "An ADC with a noise of 3 DN rms, which no gain in front of it raises.",
+        _noise("adc.noise=6 DN"),
+        "An ADC with a noise of 6 DN rms, which no gain in front of it raises.",
     ),
     "saturation": Example(
         (*_chart("step-wedge"), *GRAY, "exposure.time=40 ms", "adc.full_scale=6 V"),

@@ -44,7 +44,11 @@ adc: {bits: 12}
 CAMERAS = {
     "phone": """
 scene: {source: {kind: chart, chart: dead-leaves, seed: 3}, luminance: 150 cd/m2}
-optics: {f_number: 1.8, focal_length: 0.15 mm}
+optics:
+  f_number: 1.8
+  focal_length: 0.15 mm
+  distortion: {k1: -0.1}
+  lateral_color: {table: {450: "-0.1 %", 650: "0.2 %"}}
 pixel:
   width: 1.12 um
   photodetector: {fill_factor: 0.9, dark_current: 20 e/s}
