@@ -112,7 +112,7 @@ class JobQueue:
 
 
 class _Rest:
-    """What is left of a group. A point is made when it is taken: a study has millions of them."""
+    """The points of a group that are not taken; each is made then, since a study has millions."""
 
     def __init__(self, group: Sequence[Task]) -> None:
         self._group, self._taken = group, 0
