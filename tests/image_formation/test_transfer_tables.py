@@ -1,5 +1,7 @@
 """Tables of transfer functions against the functions that they hold."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from optical_paths import Gaussian, Leaning, light
@@ -111,8 +113,21 @@ def test_plane_tables_follow_the_phase_of_a_blur(steps):
 def test_entries_follow_the_reach_within_limits():
     size = TableSize(4e5, 100, 0.0, 8)
     assert size.plane_entries((Leaning(0, 0, 1e-9, 1e-9),)) == SMALLEST_PLANE
-    assert size.plane_entries((Leaning(0, 0, 1e-2, 1e-2),)) == LARGEST_PLANE
+    far = (Leaning(0, 0, 1e-2, 1e-2),)
+    assert size.plane_entries(far) == size.plane_entries(far, 100) == LARGEST_PLANE
+    assert size.plane_entries(far, 2) == 2048
     assert size.plane_entries((Leaning(0, 0, 1e-5, 1e-6), Leaning(0, 0, 1e-6, 1e-6))) == 97
+
+
+@pytest.mark.parametrize("entries", [41, 61])
+def test_tables_of_too_few_entries_say_what_they_err_by(entries):
+    blur = Leaning(6e-6, -4e-6, 1.5e-6, 2e-6)
+    exact, size = light(blur), TableSize(4e5, 100, 0.0, 16)
+    change = plane_grid(exact, size.top, entries).change([blur])
+    found = combined(replace(tables_of(exact), top=size.top, planes=tuple(change)), F, G)
+    worst = np.abs(found - exact.plane_response(F, G)).max() / exact.level.max()
+    assert worst < size.plane_error([blur], entries) < 20 * worst
+    assert size.plane_error([blur], size.plane_entries([blur])) == 0
 
 
 def test_a_reader_of_fewer_columns_is_the_same():

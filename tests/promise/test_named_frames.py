@@ -24,6 +24,7 @@ import pytest
         ("moved", "100068"),  # 1.1 T: their transfer ends with a jump, not along a table
         ("layers", "100008"),  # 1.5 T: halves and thirds of a pixel, gaps among them, agreed
         ("layers", "200009"),  # 3.1 T: gaps of three fifths of a pixel as one cell
+        ("layers", "200076"),  # 4.3 T at reference: a table of motion had too few entries
         ("layers", "100039"),  # 1.02 T: of 20 pixels two sums differed by little
     ],
 )

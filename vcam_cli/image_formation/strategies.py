@@ -248,10 +248,13 @@ def _spectral_layers(
     far = FarField(path, rings, image_filter, image.highest)
     followed = far.parts_with_modes(path.full) if modes else 0
     planes = [plane for plane in tables.planes if plane is not None]
+    coarse = 0.0
+    if planes and not field_rings:  # detail is at most half as strong as light from 0 to the peak
+        coarse = size.plane_error(exact.plane_blurs, planes[0].shape[-1]) * image.peak / 2
     report = SpectrumReport(
         oversampling=image.highest,
         lost_rms=math.hypot(
-            image.lost_rms, chosen.error if chosen else 0.0, rounding_error(path, scene)
+            image.lost_rms, chosen.error if chosen else 0.0, rounding_error(path, scene), coarse
         ),
         cells=0 if isinstance(scene, ChartScene) and not painted else math.prod(scene.shape),
         cells_per_pixel=g.pitch_x / scene.pitch_x if painted else 0.0,

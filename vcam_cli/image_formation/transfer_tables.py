@@ -8,6 +8,7 @@ coarse table will do.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -17,13 +18,18 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.effects.blurs import Blur, PlaneTransfer
 from vcam_cli.image_formation.transfer_functions import Transfer
-from vcam_cli.parallel import product
+from vcam_cli.parallel import product, slices_within
 from vcam_cli.physics.cache import ByteCache
 
 PARITIES = ((False, False), (True, True), (True, False), (False, True))
 """Whether a transfer function turns the cosines along x, and along y, into sines."""
 SMALLEST_PLANE, LARGEST_PLANE = 41, 513
-"""Entries along an axis of a table over fx and fy."""
+"""Entries along an axis of a table over fx and fy, at least and, of many tables, at most."""
+PLANE_VALUES = 1 << 25
+"""Entries of all tables over fx and fy, at most, where one has more than `LARGEST_PLANE` along an
+axis: 268 MB. With 513 an image that moves by six pixels erred by 0.1 % at a tolerance of 0.02 %."""
+ROWS_VALUES = 1 << 22
+"""Transfers by wavelength that are computed at once for such a table, about: 64 MB."""
 JUDGED = 256
 """Frequencies at which mixtures of spectra are judged: transfer functions are smooth."""
 
@@ -43,21 +49,55 @@ class TableSize:
     rank: int | None = None
     """Largest number of mixtures; None: as many as the tolerance requires."""
 
-    def plane_entries(self, blurs: Sequence[PlaneTransfer]) -> int:
+    def plane_entries(self, blurs: Sequence[PlaneTransfer], tables: int | None = None) -> int:
         """Return the entries along an axis of a table over fx and fy for these blurs.
 
         Parameters
         ----------
         blurs : sequence of PlaneTransfer
             These blurs.
+        tables : int, optional
+            Tables of each parity: mixtures times colors. By default many.
 
         Returns
         -------
         int
-            Entries, from `SMALLEST_PLANE` to `LARGEST_PLANE`.
+            Entries, from `SMALLEST_PLANE` to `LARGEST_PLANE`, or as many as `PLANE_VALUES` allow.
         """
-        periods = self.top * max(blur.reach for blur in blurs)
-        return int(min(max(self.steps_per_period * periods + 1, SMALLEST_PLANE), LARGEST_PLANE))
+        most = LARGEST_PLANE
+        if tables is not None:
+            most = max(most, math.isqrt(PLANE_VALUES // (len(PARITIES) * tables)))
+        wanted = self.steps_per_period * self._periods(blurs) + 1
+        return int(min(max(wanted, SMALLEST_PLANE), most))
+
+    def plane_error(self, blurs: Sequence[PlaneTransfer], entries: int) -> float:
+        """Return what a table of too few entries errs by, relative to the largest level.
+
+        A cubic spline with n steps in a period errs by about (2 pi / n)^4 / 384.
+
+        Parameters
+        ----------
+        blurs : sequence of PlaneTransfer
+            The blurs in the table; () for no table.
+        entries : int
+            Its entries along an axis.
+
+        Returns
+        -------
+        float
+            Error at one frequency; 0 where there are as many steps as required.
+        """
+        if not blurs:
+            return 0.0
+        wanted = self.steps_per_period * self._periods(blurs)
+        if entries >= int(wanted) + 1:
+            return 0.0
+        steps = self.steps_per_period * (entries - 1) / wanted
+        return float(min((2 * math.pi / steps) ** 4 / 384, 1.0))
+
+    def _periods(self, blurs: Sequence[PlaneTransfer]) -> float:
+        """Return the periods of the phase of the widest blur up to the highest frequency."""
+        return self.top * max(blur.reach for blur in blurs)
 
 
 Mixing = tuple[Array, float]
@@ -295,7 +335,8 @@ def _tabulated(exact: Transfer, size: TableSize, mixing: Mixing) -> Tables:
     mixed = exact.with_mixtures(mix)
     tables = Tables(mix, radial_table(mixed, size), size.top, error)
     if exact.plane_blurs:
-        grid = plane_grid(mixed, size.top, size.plane_entries(mixed.plane_blurs))
+        entries = size.plane_entries(mixed.plane_blurs, math.prod(mixed.weights.shape[:2]))
+        grid = plane_grid(mixed, size.top, entries)
         parts = grid.change(mixed.plane_blurs)
         planes = tuple(part if np.any(part) else None for part in parts)
         tables = replace(tables, planes=planes)
@@ -346,14 +387,12 @@ def bounding_tables(exact: Transfer, size: TableSize, mixing: Mixing) -> Tables:
 
 @dataclass(frozen=True, eq=False)
 class PlaneGrid:
-    """Frequencies at which blurs with a direction are computed, and the radial part there."""
+    """Frequencies at which blurs with a direction are computed."""
 
     radial_transfer: Transfer
     """The radial part at every second wavelength: what is added to it is small."""
     frequency: Array
     """(m,) from 0 [cycles/m]."""
-    radial: Array
-    """(J, 2 m, m) transfer at fy = frequency, then -frequency, and at fx = frequency."""
 
     def change(self, blurs: Sequence[Blur]) -> Array:
         """Return what blurs add to the light, by parity.
@@ -369,16 +408,27 @@ class PlaneGrid:
             Transfer (4, K, C, m, m) [e/s].
         """
         m = len(self.frequency)
-        fy = np.concatenate([self.frequency, -self.frequency])
-        change = np.empty(self.radial.shape, np.complex128)
+        components, colors, wavelengths = self.radial_transfer.weights.shape
+        out = np.empty((len(PARITIES), components, colors, m, m))
+        for rows in slices_within(slice(0, m), max(ROWS_VALUES // (2 * wavelengths * m), 1)):
+            out[..., rows, :] = self._change_in_rows(blurs, rows)
+        return out
+
+    def _change_in_rows(self, blurs: Sequence[Blur], rows: slice) -> Array:
+        """Return the same in some rows: (4, K, C, rows, m) [e/s]."""
+        up = self.frequency[rows]
+        fy = np.concatenate([up, -up])
+        radial = self.radial_transfer.otf_radial(np.hypot(self.frequency, up[:, None]))
+        radial = np.concatenate([radial, radial], axis=1)
+        change = np.empty(radial.shape, np.complex128)
         wavelengths = self.radial_transfer.wavelengths
-        for part, radial, wavelength in zip(change, self.radial, wavelengths, strict=True):
+        for part, radial_part, wavelength in zip(change, radial, wavelengths, strict=True):
             otf = np.ones(part.shape, np.complex128)
             for blur in blurs:
                 otf *= blur.smooth_otf_plane(self.frequency, fy, float(wavelength))
-            np.multiply(otf - 1, radial, out=part)
+            np.multiply(otf - 1, radial_part, out=part)
         both = self.radial_transfer.spectral_sum(change)
-        return split_by_parity(both[..., :m, :], both[..., m:, :])
+        return split_by_parity(both[..., : len(up), :], both[..., len(up) :, :])
 
 
 def split_by_parity(plus: Array, minus: Array) -> Array:
@@ -443,9 +493,7 @@ def plane_grid(transfer: Transfer, top: float, entries: int) -> PlaneGrid:
         The grid.
     """
     radial_transfer = transfer.with_effects(transfer.radial_blurs).with_half_the_wavelengths()
-    f = np.linspace(0, top, entries)
-    length = np.hypot(f[None, :], np.concatenate([f, f])[:, None])
-    return PlaneGrid(radial_transfer, f, radial_transfer.otf_radial(length))
+    return PlaneGrid(radial_transfer, np.linspace(0, top, entries))
 
 
 def mixtures(

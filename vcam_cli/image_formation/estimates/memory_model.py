@@ -21,6 +21,7 @@ from vcam_cli.image_formation.plane_products import product_entries
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.transfer_tables import (
     PARITIES,
+    ROWS_VALUES,
     TableSize,
 )
 from vcam_cli.physics.aberration import GRID_CACHE_BYTES
@@ -166,10 +167,11 @@ def table_bytes(path: OpticalPath, planes: int, size: TableSize) -> int:
         if path.field_rings:
             entries = product_entries(directed, path.field_rings, size)
         else:
-            entries = size.plane_entries(directed)
+            entries = size.plane_entries(directed, planes * colors)
         per_table = entries**2 * planes * colors * len(PARITIES)
         # by wavelength, by parity, and copies of the latter
-        tables = len(light) * 2 * entries**2 * 24 + 3 * 8 * per_table
+        by_wavelength = min(len(light) * 2 * entries**2, ROWS_VALUES) * 40
+        tables = by_wavelength + 3 * 8 * per_table
         of_blurs = round(SLACK * (tables + sum(blur.kept_bytes(light) for blur in directed)))
     directed = of_kind([ring.blur for ring in path.field_rings], PlaneTransfer)
     if not directed:
