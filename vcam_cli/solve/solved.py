@@ -324,9 +324,12 @@ class Solved:
         Returns
         -------
         Self
-            Camera with these seeds.
+            Camera with these seeds, and the same readout chain: nothing in it is drawn.
         """
-        return self._with(seed=seed)
+        found = self._with(seed=seed)
+        # Of a camera with two readouts, solving it anew takes a quarter of the time of `verify`.
+        found.__dict__["chain"] = self.chain
+        return found
 
     def with_samples_at(self, times: tuple[float, ...], estimator: str) -> Self:
         """Return the same camera with other times of samples, and another estimator.
