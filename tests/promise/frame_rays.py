@@ -229,7 +229,7 @@ def _values(squares: np.ndarray, y: np.ndarray, x: np.ndarray, fills: bool) -> n
         lit.append(((place >= 0) & (place < count)) | fills)
         place = place % (2 * count)
         index.append(np.where(place < count, place, 2 * count - 1 - place))
-    found = squares[np.ix_(*index)]
+    found = squares[index[0]][:, index[1]]
     return found if fills else found * np.outer(*lit)
 
 

@@ -23,8 +23,12 @@ import pytest
         ("moved", "200218"),  # lobes of coarse samples below zero: light is clipped there
         ("moved", "100068"),  # 1.1 T: their transfer ends with a jump, not along a table
         ("layers", "100008"),  # 1.5 T: halves and thirds of a pixel, gaps among them, agreed
-        ("layers", "200009"),  # 3.1 T: gaps of three fifths of a pixel as one cell
-        ("layers", "200076"),  # 4.3 T at reference: a table of motion had too few entries
+        # 3.1 T: gaps of three fifths of a pixel as one cell; 8 s, and the quick test of the cells
+        # that rays lie in finds that, too
+        pytest.param("layers", "200009", marks=pytest.mark.long),
+        # 4.3 T at reference: a table of motion had too few entries; 20 s, and a quick test of tables
+        # finds that, too
+        pytest.param("layers", "200076", marks=pytest.mark.long),
         ("layers", "100039"),  # 1.02 T: of 20 pixels two sums differed by little
     ],
 )

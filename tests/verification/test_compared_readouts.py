@@ -59,7 +59,7 @@ def bench(tmp_path_factory):
             dark = {"scene.source": {"kind": "chart", "chart": "dark"}, "seed.frame": seed}
             result = simulate(true.with_(light if share else dark))
             write_raw(result, folder / f"f_{share:g}_{number}.exr")
-    for readout, listed in (*LEVELS.items(), ("", LEVELS["gain1"])):
+    for readout, listed in (*LEVELS.items(), ("", LEVELS["gain1"][::2])):
         flats = [
             {
                 "files": f"f_{share:g}_*.exr",
@@ -105,9 +105,10 @@ def test_merged_codes_are_not_fitted(bench):
 def test_the_camera_predicts_all_of_its_readouts(readout, bench):
     """Means within 1 %, and no quantity of noise beyond the bound of its many."""
     camera = load(bench / "two.yaml")
-    found = verify(camera, measurement_file.read(bench / f"bench-{readout}.yaml"))
+    file = measurement_file.read(bench / f"bench-{readout}.yaml")
+    found = verify(camera, file)
     rows = [row for row in found.rows if row.quantity.startswith("mean")]
-    assert len(rows) >= 7
+    assert len(rows) >= len(file.frames) >= 4
     for row in rows:
         assert row.predicted == pytest.approx(row.measured, rel=0.01)
     missed = [row for row in found.rows if row.deviation and abs(row.deviation) > row.bound]
@@ -115,7 +116,7 @@ def test_the_camera_predicts_all_of_its_readouts(readout, bench):
 
 
 def test_another_gain_is_missed(bench):
-    """So that the test above can fail: 5 % more of the high gain alone."""
+    """So that the test above can fail: 5 % more of the high gain alone; a quarter of read noise."""
     tree = json.loads(json.dumps(TRUE))
     tree["pixel"]["readout"]["gains"] = [1, 8.4]
     tree["name"] = "wrong"
@@ -124,7 +125,10 @@ def test_another_gain_is_missed(bench):
         verify(load(bench / "wrong.yaml"), measurement_file.read(bench / "bench-gain8.yaml"))
     tree["pixel"]["readout"] |= {"gains": [1, 8], "read_noise": "15 e"}
     (bench / "wrong.yaml").write_text(yaml.safe_dump(tree, sort_keys=False))
-    found = verify(load(bench / "wrong.yaml"), measurement_file.read(bench / "bench-gain8.yaml"))
+    dark = yaml.safe_load((bench / "bench-gain8.yaml").read_text())
+    dark["frames"] = dark["frames"][:1]
+    (bench / "dark.yaml").write_text(yaml.safe_dump(dark))
+    found = verify(load(bench / "wrong.yaml"), measurement_file.read(bench / "dark.yaml"))
     assert any(row.deviation and abs(row.deviation) > row.bound for row in found.rows)
 
 
