@@ -26,8 +26,8 @@ import pytest
         # 3.1 T: gaps of three fifths of a pixel as one cell; 8 s, and the quick test of the cells
         # that rays lie in finds that, too
         pytest.param("layers", "200009", marks=pytest.mark.long),
-        # 4.3 T at reference: a table of motion had too few entries; 20 s, and a quick test of tables
-        # finds that, too
+        # 4.3 T at reference: a table of motion had too few entries; 20 s, and a quick test of
+        # tables finds that, too
         pytest.param("layers", "200076", marks=pytest.mark.long),
         ("layers", "100039"),  # 1.02 T: of 20 pixels two sums differed by little
     ],
