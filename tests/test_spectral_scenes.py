@@ -205,7 +205,8 @@ def test_memory_is_estimated_and_envi_files_stay_on_the_disk(tmp_path):
         )  # fmt: skip
         found[kind] = [int(word) for word in told.stdout.split()]
     for peak, estimate, _ in found.values():
-        assert peak <= estimate <= 1.6 * peak
+        run = peak + 37e6  # `vcam run`, for which the estimate is, takes that more than a call
+        assert run <= estimate <= 1.35 * run
     assert found["npz"][2] == found["hdr"][2]
     for kind in found:
         assert isinstance(read_cube(tmp_path / f"cube.{kind}", "file")[0].data, StoredSamples)
