@@ -43,6 +43,12 @@ def label(path: Path) -> str:
 
 
 @cache
+def loaded(name: str):
+    """A shipped camera."""
+    return load(name)
+
+
+@cache
 def small(name: str):
     """A shipped camera with fewer pixels, simulated."""
     return simulate(load(name, SMALL))
@@ -50,7 +56,7 @@ def small(name: str):
 
 @cache
 def files_of_cameras() -> set[Path]:
-    return {file for name in CAMERAS for file in load(name).files}
+    return {file for name in CAMERAS for file in loaded(name).files}
 
 
 def picture(path: Path) -> np.ndarray:
@@ -80,7 +86,7 @@ class TestCameras:
         assert run["name"] == name
         for file in ("raw.exr", "render.png", "metrics.csv"):
             assert (tmp_path / "out" / file).stat().st_size > 100
-        if load(name).optics.is_lens:  # a bare sensor under even light takes no picture
+        if loaded(name).optics.is_lens:  # a bare sensor under even light takes no picture
             render = picture(tmp_path / "out" / "render.png").astype(float)
             assert render.std() > 10
             assert 20 < render.mean() < 240  # an eye chart is white paper, most of it
@@ -104,7 +110,7 @@ class TestCameras:
             assert metrics["saturated_fraction"] < 0.01
 
     def test_the_lens_and_the_pixels_could_be_built(self, name):
-        camera = load(name)
+        camera = loaded(name)
         g = geometry(camera)
         if g.has_lens:
             assert 0.9 <= g.f_number <= 22
@@ -126,7 +132,7 @@ class TestCameras:
 
 def test_the_benchmark_camera():
     """Twelve megapixels, Bayer, and every effect that it describes on."""
-    camera = load("12mp-bayer")
+    camera = loaded("12mp-bayer")
     assert (camera.array.rows, camera.array.columns) == (3000, 4000)
     assert camera.array.pattern == "bayer-rggb"
     assert camera.effects == "all"
@@ -142,7 +148,7 @@ def test_everything_has_every_effect_of_its_architecture():
     measured pattern, and a drain takes all excess charge: the figures of README are of that. Its
     pan has the motion.
     """
-    camera = load("everything")
+    camera = loaded("everything")
     described = camera_effects(camera, geometry(camera)).found
     missing = {name for name, effect in described.items() if effect is None}
     assert missing == {

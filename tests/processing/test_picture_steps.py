@@ -13,6 +13,8 @@ from vcam_cli.processing import jpeg, picture_steps
 from vcam_cli.processing.base import Block
 from vcam_cli.simulation.simulate import simulate
 
+pytestmark = pytest.mark.keeps_light  # steps are tried on the light of a few scenes
+
 BT709 = np.array([0.2126, 0.7152, 0.0722])
 
 
