@@ -184,7 +184,8 @@ def test_failing_rays_are_counted_with_their_field():
     front = blur.view.wavefront(angle, waves, u, v, chief)
     alive = front.alive & np.isfinite(front.path)
     assert lost == pytest.approx(1 - alive.mean(), abs=5 * math.sqrt(lost / 4000) + 0.02)
-    notes = prepare(model)[1]
+    # The blur itself is not needed: 40 s, for such rays land far from each other.
+    notes = prepare(model.with_({"effects": {"aberration": "off"}}))[1]
     [said] = [note for note in notes if "rays through the stop fail" in note]
     assert f"{100 * lost:.2g} % of the rays" in said
     assert f"{height * 1e3:.4g} mm off axis" in said
