@@ -32,8 +32,11 @@ def noise(seed: int = 0) -> np.ndarray:
 def cut(radius: np.ndarray, allowed: float = 1e-3, picture: np.ndarray | None = None):
     picture = noise() if picture is None else picture
     full = full_signal(picture, PITCH, PIXEL)
-    detail = picture_detail(picture, PITCH, (PIXEL, PIXEL), passes, full, PIXEL)
-    return cut_depth(radius, picture, PITCH, PIXEL, detail, allowed)
+
+    def detail_of(light: np.ndarray):
+        return picture_detail(light, PITCH, (PIXEL, PIXEL), passes, full, PIXEL)
+
+    return cut_depth(radius, picture, PITCH, PIXEL, detail_of, allowed)
 
 
 def test_a_disc_passes_nothing_at_the_first_zero_of_its_transfer():
@@ -113,6 +116,44 @@ def test_the_blur_between_layers_is_as_exact_as_predicted(allowed):
     error = float(np.sqrt(np.square(seen[0] - (seen[1] + seen[2]) / 2).mean()))
     # In the middle it is the largest; discs of squares and the picture's border leave the rest.
     assert error <= 1.6 * max(found.error, 2e-5) + 2e-4
+
+
+def rows_on_pixels(radius: np.ndarray) -> np.ndarray:
+    """Means over pixels (12,) of rows (48,), each behind a disc of its own: in closed form."""
+
+    def primitive(t: np.ndarray) -> np.ndarray:  # twice, of the profile of a disc of the radius 1
+        inner = np.clip(t, -1, 1)
+        root = np.sqrt(1 - inner**2)
+        inside = inner / 2 + (inner * np.arcsin(inner) + root - root**3 / 3) / np.pi
+        return inside + np.maximum(t - 1, 0)
+
+    edges = (np.arange(13) * 4)[:, None] * PITCH
+    total = np.zeros((12, 48))
+    for start in (-48, 0, 48):  # the picture goes on as its mirror image
+        place = (np.arange(48) + start) * PITCH
+        order = np.arange(48) if start == 0 else np.arange(48)[::-1]
+        own = radius[order]
+        swept = own * (primitive((edges - place) / own) - primitive((edges - place - PITCH) / own))
+        total[:, order] += np.diff(swept, axis=0) / PIXEL
+    return total
+
+
+@pytest.mark.parametrize("allowed", [3e-3, 1e-3, 3e-4])
+def test_smooth_light_on_a_slope_errs_as_predicted(allowed):
+    """Hardly any detail but that of the shares: cover is not even, nor what it mixes."""
+    radius = np.linspace(24e-6, 8e-6, 48)
+    light = np.linspace(0.2, 0.8, 48)
+    found = cut(radius[:, None] + np.zeros((48, 48)), allowed, light[:, None] * np.ones((48, 48)))
+    first, share = found.first[:, 0].astype(int), found.share[:, 0]
+    near, far = rows_on_pixels(found.radii[first]), rows_on_pixels(found.radii[first + 1])
+    true = rows_on_pixels(radius)
+    lacks = near * (1 - share) + far * share - true
+    seen = true @ light
+    error = lacks @ light - seen / true.sum(axis=1) * lacks.sum(axis=1)
+    rms = float(np.sqrt(np.square(error).mean())) / float(seen.max())
+    assert len(found.radii) > 2
+    assert found.error <= allowed
+    assert found.error / 20 <= rms <= found.error
 
 
 def test_few_values_are_layers_themselves():

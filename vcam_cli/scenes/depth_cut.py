@@ -7,8 +7,10 @@ second order of the layers' spacing,
 
     T(r) = (1 - w) T(r_i) + w T(r_i+1) + O((r_i - r_i+1)^2).
 
-How wide the spacing may be, the picture's own power spectrum tells: a picture without detail looks
-the same at any distance.
+How wide the spacing may be, the power spectrum of 4 w (1 - w) times the picture tells, behind the
+blurs' second difference. Even light has detail, too, where shares change. But layers are composed
+such that even light stays even: light counts by what it differs from the mean, and cover that is
+not 1 by the contrast of what it mixes.
 
 Behind a sample with farther ones beside it, so near that rays through the aperture pass it, what
 the picture does not show goes on as the nearest of these: its light and its distance. A second
@@ -18,8 +20,9 @@ guess, the picture's mirror image at the edge, estimates its error.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -32,7 +35,10 @@ MOST_LAYERS = 256
 FINEST = 2e-5
 """Error of the cuts below which no more layers are made, rms, relative to full signal."""
 BETWEEN = math.sqrt(8 / 15)
-"""Rms over all places between two layers of an error that is largest in the middle, 4 t (1 - t)."""
+"""Rms over all places between two layers of an error that is largest in the middle, 4 t (1 - t).
+Spacings are chosen alike by it; how wide they may be, the shares themselves tell."""
+TRIES = 8
+"""Cuts that are tried. Errors fall as the square of the spacing: two or three are enough."""
 LEAST_JUMP = 0.1
 """Difference of blur radii above which one sample hides another [pixels]. At `standard` random
 depths then err by 1e-3 of full signal, by 6e-4 with half of it, by 2e-2 with ten times as much."""
@@ -140,7 +146,12 @@ def is_flat(radius: Array, detail: Detail, allowed: float) -> bool:
 
 
 def cut_depth(
-    radius: Array, picture: Array, pitch: float, pixel: float, detail: Detail, allowed: float
+    radius: Array,
+    picture: Array,
+    pitch: float,
+    pixel: float,
+    detail_of: Callable[[Array], Detail],
+    allowed: float,
 ) -> DepthCut:
     """Cut a picture into layers.
 
@@ -149,13 +160,13 @@ def cut_depth(
     radius : Array
         Radius (h, w) of the blur at every sample's distance, with its sign [m].
     picture : Array
-        Light (h, w), relative to white, by which the guesses of what is hidden are judged.
+        Light (h, w), relative to white.
     pitch : float
         Pitch of the samples on the sensor [m].
     pixel : float
         Side of the pixels [m].
-    detail : Detail
-        Detail of the picture.
+    detail_of : callable
+        What returns the detail of light (h, w) on the same samples.
     allowed : float
         Error that the cut may leave, rms, relative to full signal.
 
@@ -164,18 +175,60 @@ def cut_depth(
     DepthCut
         The layers.
     """
-    radii, error = _layer_radii(radius, detail, max(allowed, FINEST))
-    values = _few_values(radius, len(radii))
-    if values is not None:
-        radii, error = values, 0.0
-    if len(radii) == 1:
-        first, share = np.zeros(radius.shape, np.uint16), np.zeros(radius.shape, np.float32)
-    else:
-        place = np.interp(-radius, -radii, np.arange(len(radii)))
-        first = np.minimum(place, len(radii) - 2).astype(np.uint16)
-        share = (place - first).astype(np.float32)
+    allowed = max(allowed, FINEST)
+    detail, aim = detail_of(picture), allowed
+    for _ in range(TRIES):
+        radii, reached = _layer_radii(radius, detail, aim)
+        values = _few_values(radius, len(radii))
+        radii = radii if values is None else values
+        first, share = _shares(radius, radii)
+        if len(radii) == 1:
+            error = reached if values is None else 0.0
+        else:
+            error = _mixing_error(radii, picture, first, share, detail, detail_of)
+        if error <= allowed or reached > aim:
+            break
+        aim *= max(0.9 * allowed / error, 0.1)
     hidden = _hidden(radius / pitch, picture, LEAST_JUMP * pixel / pitch)
     return DepthCut(radii, first, share, hidden, error)
+
+
+def _shares(radius: Array, radii: Array) -> tuple[Array, Array]:
+    """Return the layer (h, w) of every sample, the nearer one of two, and the farther one's share.
+
+    Parameters are the samples' radii (h, w) and those of the layers (N,), falling.
+    """
+    if len(radii) == 1:
+        return np.zeros(radius.shape, np.uint16), np.zeros(radius.shape, np.float32)
+    place = np.interp(-radius, -radii, np.arange(len(radii)))
+    first = np.minimum(place, len(radii) - 2).astype(np.uint16)
+    return first, (place - first).astype(np.float32)
+
+
+def _mixing_error(
+    radii: Array,
+    picture: Array,
+    first: Array,
+    share: Array,
+    detail: Detail,
+    detail_of: Callable[[Array], Detail],
+) -> float:
+    """Return the rms error, over full signal, of blurs that are mixed of two layers'.
+
+    What all pairs of layers lack adds up as mean squares: with its signs it is 0.2 to 1.04 times
+    as much on slopes of 4 to 38 layers. That of light and that of cover add up.
+    """
+    mixed, contrast = 4 * share * (1 - share), picture - picture.mean()
+    squares = np.zeros(2)
+    for number, (near, far) in enumerate(pairwise(radii)):
+        here = np.where(first == number, mixed, 0)
+        if here.any():
+            lacks = (1, (near + far) / 2), (-0.5, near), (-0.5, far)
+            lost = [detail_of(light).blur_change(*lacks) for light in (here * contrast, here)]
+            squares += np.square(lost)
+    light, cover = np.sqrt(squares)
+    seen = detail.rms(np.ones_like(detail.frequency)) * detail.full
+    return float(light + seen * cover)
 
 
 def _layer_radii(radius: Array, detail: Detail, allowed: float) -> tuple[Array, float]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -376,7 +377,14 @@ def depth_scene(
         _brightness(flat),
         flat.pitch_x,
         max(view.pitch_x, view.pitch_y),
-        detail,
+        partial(
+            picture_detail,
+            pitch=flat.pitch_x,
+            aperture=blur.aperture,
+            lens=blur.sharp,
+            full=detail.full,
+            pixel=pixel,
+        ),
         SHARE * tolerance,
     )
     distances = tuple(blur.distance(float(r)) for r in cut.radii)
