@@ -73,7 +73,9 @@ def test_out_of_focus_a_point_becomes_the_aperture(tmp_path, sign):
     assert np.abs(found / found.sum() - expected).sum() < 0.02
 
 
-@pytest.mark.parametrize(("seed", "sharp"), [(1, True), (3, False)])
+@pytest.mark.parametrize(
+    ("seed", "sharp"), [(1, True), pytest.param(3, False, marks=pytest.mark.long)]
+)
 def test_layers_are_a_sum_over_points_of_the_aperture(tmp_path, seed, sharp):
     """One of two in focus, or none: each hides the other by rays through the open parts."""
     scene = random_scene(np.random.default_rng(seed), 2, sharp)
