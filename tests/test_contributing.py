@@ -68,8 +68,10 @@ def test_there_is_a_recipe_for_every_kind_of_addition():
 ANY_CHARTS = {"vcam_cli/simulation/scene_plans.py"}
 """Sources that name some charts, which any others could stand for."""
 OTHERS = {
-    "lateral_color": {  # of a traced lens, which has one of its own; and an equation that names it
+    # of a traced lens, which has one of its own; of layers, which see it; an equation that names it
+    "lateral_color": {
         "vcam_cli/camera/derived/prescription.py", "vcam_cli/effects/optics/traced_blur.py",
+        "vcam_cli/camera/derived/lens_mapping.py",
         "vcam_cli/simulation/lens_page.py", "vcam_cli/image_formation/warps.py",
         "vcam_cli/camera/derived/lens_mapping.py",  # refuses it before maps of depth
     },
