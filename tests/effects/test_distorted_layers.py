@@ -20,8 +20,11 @@ from layered_reference import (
 from making import QUIET, camera, radiance_for
 from test_depth import FEW, RAYS, error, seen
 
-from vcam_cli import simulate
+from vcam_cli import load, simulate
 from vcam_cli.errors import BadInput
+
+FEWER = ("array.rows=48", "array.columns=64", "quality=[]")
+"""A table-top on few pixels."""
 
 
 def undistorted(z: np.ndarray, k1: float, focal: float) -> np.ndarray:
@@ -198,3 +201,14 @@ def test_a_flat_layer_is_the_picture_itself(tmp_path):
         for own in (Scene((far,), scene.focus), Scene((beside, far), scene.focus))
     )
     assert np.sqrt(np.mean((one - two) ** 2)) <= 2e-3 * one.max()
+
+
+def test_layers_seen_through_a_map_cost_the_cells_that_are_painted():
+    """Each cell of each layer, whatever its planes; without a lens that distorts none."""
+    for lens, painted in (["optics.distortion={k1: -0.1}"], True), ([], False):
+        spectrum = simulate(load("table-top", [*lens, *FEWER])).frame.spectrum
+        parts = [own for *_, own in spectrum.parts]
+        assert len(parts) == 4
+        for own in parts:
+            assert own.warped_cells == (own.cells if painted else 0)
+            assert own.cells > 0 or not painted

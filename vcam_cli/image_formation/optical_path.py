@@ -314,8 +314,8 @@ class SpectrumReport:
     """Those places; 0 where there is no need for them."""
     places_per_pixel: int = 0
     """How many of them lie along each side of a pixel."""
-    warped_values: int = 0
-    """Values of a chart that were looked up where a warp sees them."""
+    warped_cells: int = 0
+    """Cells that were painted where a warp sees them."""
     table_values: int = 0
     """Values of transfer functions of fx and fy that were computed."""
     peak: float = 0.0

@@ -206,14 +206,14 @@ def warped_layers(path: OpticalPath, scene: AnyScene) -> tuple[Layers, SpectrumR
     ]
     reports = [report for _, report in found]
     if not seen.is_magnified:
-        reports = [_with_warped_values(own) for own in reports]
+        reports = [_with_warped_cells(own) for own in reports]
     return chain(*(layers for layers, _ in found)), _joined(rest, reports)
 
 
-def _with_warped_values(report: SpectrumReport) -> SpectrumReport:
+def _with_warped_cells(report: SpectrumReport) -> SpectrumReport:
     """Return a report whose cells, and those of its layers, were painted through a map."""
-    parts = tuple((g, colors, _with_warped_values(own)) for g, colors, own in report.parts)
-    return replace(report, warped_values=report.cells * report.planes, parts=parts)
+    parts = tuple((g, colors, _with_warped_cells(own)) for g, colors, own in report.parts)
+    return replace(report, warped_cells=report.cells, parts=parts)
 
 
 @dataclass(frozen=True)

@@ -107,8 +107,8 @@ def left_to_processor(ready: Prepared) -> tuple[str, ...]:
     filtered = [own for own in every if own.terms]
     named = {
         "light in closed form": not (filtered or report.sub_exposures),
-        "painting through distortion": any(own.warped_values for own in every),
-        "painting of charts": any(own.is_painted and not own.warped_values for own in every),
+        "painting through distortion": any(own.warped_cells for own in every),
+        "painting of charts": any(own.is_painted and not own.warped_cells for own in every),
         "spectra in closed form": any(not (own.cells or own.is_averaged) for own in filtered),
         "surroundings of the array": any(own.far_parts for own in every),
         "occlusion by layers": bool(report.depth or report.cut),
