@@ -93,6 +93,11 @@ CAMERAS = {
     "a honeycomb": ("cfa-honeycomb", [*LARGE, "quality=[]"]),
     "a picture that is judged": ("starter", [*LARGE, "quality=[s-cielab]"]),
     "a monochrome edge": ("slanted-edge-f8", LARGE),
+    # each is as large as the array, and kept while the next one is formed
+    "layers that are distorted": (
+        "table-top",
+        ["array.rows=960", "array.columns=1280", "optics.distortion={k1: -0.1}"],
+    ),
 }
 QUICK = ("rectangles", "a wide margin")
 PICTURES = {

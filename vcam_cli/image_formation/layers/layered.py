@@ -421,7 +421,11 @@ def _report(
     """Return the report on the image of layers, with its error [e/s]."""
     reports = [layer.report for layer in layers]
     names = {name for own in reports for name in own.changes}
-    held = sum(layer.light.nbytes + layer.cover.nbytes for layer in layers)
+    held, forming = 0, 0
+    for layer in layers:  # while one is formed, those before it are kept
+        cover = layer.cover.nbytes if layer.path.has_opacity else 0  # else the same number all over
+        held += layer.light.nbytes + cover
+        forming = max(forming, layer.report.memory + held)
     composed = memory_model.composed_bytes(path, held)
     return SpectrumReport(
         oversampling=max((own.oversampling for own in reports), default=0.0),
@@ -430,7 +434,7 @@ def _report(
             name: math.hypot(*(own.changes.get(name, 0.0) for own in reports)) for name in names
         },
         peak=math.inf,
-        memory=max([composed, *(own.memory for own in reports)]),
+        memory=max(composed, forming),
         depth=depth,
         parts=tuple(
             (layer.path.geometry, len(layer.path.mosaic.colors), layer.report) for layer in layers
