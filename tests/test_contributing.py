@@ -73,7 +73,6 @@ OTHERS = {
         "vcam_cli/camera/derived/prescription.py", "vcam_cli/effects/optics/traced_blur.py",
         "vcam_cli/camera/derived/lens_mapping.py",
         "vcam_cli/simulation/lens_page.py", "vcam_cli/image_formation/warps.py",
-        "vcam_cli/camera/derived/lens_mapping.py",  # refuses it before maps of depth
     },
     "small": {"vcam_cli/config/quantities.py"},  # the word: too small
 }  # fmt: skip
