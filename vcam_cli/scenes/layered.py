@@ -208,7 +208,7 @@ class WarpedLayer(WarpedChart):
         """Return bounds on the least and the largest opacity in cells (rows, columns).
 
         They are those of all flat cells that a cell may see: about the one where its center looks,
-        as far as half its diagonal at the largest scale, and one more.
+        up to half its diagonal at the largest scale away, and one more.
         """
         from scipy.ndimage import maximum_filter, minimum_filter
 
@@ -388,7 +388,7 @@ class LayeredScene:
         Returns
         -------
         LayeredScene
-            The layers. None has a known size: a distorted rectangle is none.
+            The layers. Their sizes are not known: a distorted rectangle has other borders.
         """
         how = sees, widest, sharp, alike
         parts = (

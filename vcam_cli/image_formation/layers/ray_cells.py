@@ -2,8 +2,8 @@
 
 Cells divide pixels evenly where lens or silicon blur the image on them. Where a pixel sees its own
 photodetector alone, they divide that, and apart from it the gap to the next one: a cell astride the
-rim of a photodetector would mix what is seen with what is not, and halves and thirds of a pixel may
-err alike (by 4.4 % of full signal in a pixel, where edges of layers lie in the gap).
+rim of a photodetector would mix light inside with light beside it, and halves and thirds of a pixel
+may err alike (by 4.4 % of full signal in a pixel, where edges of layers lie in the gap).
 """
 
 from __future__ import annotations

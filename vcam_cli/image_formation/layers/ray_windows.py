@@ -14,8 +14,8 @@ that is too much a still finer set of the other kind follows, window by window, 
 together are within what is allowed.
 
 Where lens and silicon blur nothing, layers in focus have detail within cells, and sums on cells of
-a half and a third of a pixel may agree by chance. There, three sums are the least, and the last one
-errs by half of its difference from the first one, or more.
+a half and a third of a pixel may agree and both err. There, three sums are the least, and the last
+one errs by half of its difference from the first one, or more.
 
 Layers of a map of depth are summed by `ray_composition.py`: shares of a surface add up. Planes are
 the same by both to 0.01 % of full signal, in a tenth and a thirtieth of the frame's time.
