@@ -11,12 +11,15 @@ from __future__ import annotations
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.parallel import slices_within
 
 WINDOW = 15
 """Pixels along the side of a window."""
 LEAST_DETAIL = 25.0
 """Least mean square of differences of neighbors in a window, over that of their noise, at which a
 shift can be measured: below it a window's best shift is that of its noise."""
+AT_ONCE = 1 << 20
+"""Sums of windows that are held at once, about: 8 MB."""
 
 
 def disparity(left: Array, right: Array, most: int, noise: Array | float = 0.0) -> Array:
@@ -37,6 +40,18 @@ def disparity(left: Array, right: Array, most: int, noise: Array | float = 0.0) 
         Disparity (rows, columns), position in `left` less that in `right` [pixels]; NaN where
         nothing tells it.
     """
+    noise = np.broadcast_to(np.asarray(noise), left.shape)
+    out = np.empty(left.shape)
+    band = max(AT_ONCE // (left.shape[1] * (2 * most + 3)), WINDOW)
+    for rows in slices_within(slice(0, len(out)), band):
+        around = slice(max(rows.start - WINDOW, 0), rows.stop + WINDOW)
+        found = _disparity(left[around], right[around], most, noise[around])
+        out[rows] = found[rows.start - around.start :][: rows.stop - rows.start]
+    return out
+
+
+def _disparity(left: Array, right: Array, most: int, noise: Array) -> Array:
+    """Return the disparity of a few rows, as `disparity` does."""
     from scipy.ndimage import uniform_filter
 
     left, right = (np.asarray(side, float) for side in (left, right))
@@ -51,7 +66,7 @@ def disparity(left: Array, right: Array, most: int, noise: Array | float = 0.0) 
     bend = before - 2 * least + after
     offset = np.where(bend > 0, (before - after) / np.where(bend > 0, 2 * bend, 1), 0.0)
     detail = uniform_filter(np.gradient(left + right, axis=1) ** 2, WINDOW)
-    told = (detail > LEAST_DETAIL * np.asarray(noise)) & (bend > 0)
+    told = (detail > LEAST_DETAIL * noise) & (bend > 0)
     return np.where(told, shifts[best] + offset, np.nan)
 
 

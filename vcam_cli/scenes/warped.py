@@ -66,7 +66,7 @@ LOOKS, LOOKS_IN_TILE = 33, 5
 """Places along each side of a map, and of a tile, at which its scale is looked at."""
 TINY = 1e-30
 """Less than any second moment that counts."""
-SQUARES = 200
+SQUARES = 270
 """Temporary arrays for each cell whose squares are painted, as measured [bytes]."""
 CORNERS = ((-1, -1), (-1, 1), (1, -1), (1, 1))
 """Signs of the ways to four squares."""

@@ -56,6 +56,8 @@ class ExposedLight:
     """As `Prepared.sharing`."""
     effects: tuple[Effect, ...]
     """Effects that act before electrons are counted and are not left out of the light."""
+    memory: int = 0
+    """Memory in which the light of half a lens was formed beside that of all of it [bytes]."""
 
 
 def expose(seen: SceneLight, light: photon_rate.Rate, is_planned: bool = True) -> ExposedLight:
@@ -128,14 +130,17 @@ def expose(seen: SceneLight, light: photon_rate.Rate, is_planned: bool = True) -
         full_charge = _full_charge(groups, lit, rate, pixel_dark, effects, full_rate) * time
     moving = of_kind(effects, ImageMotion)
     steps = pairwise((0.0, *times)) if timed or moving else ()
-    halves = None
+    halves, memory = None, 0
     if (phase := solved.pixel.phase_detection) is not None:
         whole, defocus = light.plan.reduced(path), solved.geometry.focus_shift
         radius = (solved.optics.defocus + defocus) / (2 * solved.geometry.working_f_number)
 
         def of_half(half: int) -> Array:
+            nonlocal memory
             part = half_images.half_path(whole, radius, half)
-            return collect(photon_rate.photo_rate(part, seen.scene).values, 0.0, time)
+            formed = photon_rate.photo_rate(part, seen.scene)
+            memory = max(memory, light.values.nbytes + 2 * rate.nbytes + formed.spectrum.memory)
+            return collect(formed.values, 0.0, time)
 
         halves = half_images.half_rates(rate, phase.separation, of_half)
         if phase.masked is not None:
@@ -161,6 +166,7 @@ def expose(seen: SceneLight, light: photon_rate.Rate, is_planned: bool = True) -
         halves=halves,
         sharing=sharing,
         effects=effects,
+        memory=memory,
     )
     if not is_planned:
         return exposed

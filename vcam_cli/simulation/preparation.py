@@ -19,6 +19,7 @@ from vcam_cli.effects.pixel_signal import Overflow, Retention
 from vcam_cli.effects.signal_chain import Limit, full_well
 from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.image_formation import photon_rate
+from vcam_cli.image_formation.estimates.memory_model import DISPARITY, HALVES
 from vcam_cli.image_formation.neighbor_sharing import Sharing
 from vcam_cli.image_formation.optical_path import SpectrumReport
 from vcam_cli.image_formation.settings import Settings
@@ -195,14 +196,17 @@ def plan_frame(
         The camera, ready to take its frame.
     """
     solved = seen.solved.at_gain(exposed.settings.gain)
+    pixels, of_halves = solved.geometry.rows * solved.geometry.columns, 0
+    if exposed.halves is not None:
+        of_halves = pixels * (HALVES + DISPARITY * solved.output.phase)
     decided = plan.make(
         solved.effects,
         solved.tolerance,
-        solved.geometry.rows * solved.geometry.columns,
+        pixels,
         solved.settings,
         exposed.light_plan,
         exposed.signal,
-        max(seen.memory, light.spectrum.memory) + seen.picture_memory,
+        max(seen.memory, light.spectrum.memory, exposed.memory) + of_halves + seen.picture_memory,
         light.spectrum.changes | exposed.changes,
     )
     if of_kind(exposed.effects, ImageMotion):  # every sample has light of its own

@@ -29,9 +29,12 @@ from vcam_cli.physics.pupil_harmonics import MOST
 from vcam_cli.scenes.bands import bands_of_rows
 from vcam_cli.scenes.base import ChartScene, SampledScene
 
-BASE = 150_000_000
+BASE = 155_000_000
 """Interpreter and libraries of `vcam run`, 132 to 145 MB; a call of the library takes
 40 MB less [bytes]."""
+HALVES, DISPARITY = 100, 170
+"""What codes of both halves of a pixel take, and writing them and their disparity beside other
+files [bytes]: 27 and 45 MB were measured for `dual-pixel`, beyond what its light takes."""
 JUDGED = 22
 """What comparing an image with the ideal one takes for each color of a pixel [bytes]."""
 SLACK = 1.1
