@@ -11,6 +11,7 @@ import resource
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -383,5 +384,9 @@ def record(result: Photograph, inputs: tuple[Path, ...], seconds: float) -> dict
 
 def peak_memory() -> int:
     """Return the largest memory of this process so far [bytes]."""
+    # Linux's `ru_maxrss` begins with the memory of the process that started this one.
+    with suppress(OSError, StopIteration):
+        lines = Path("/proc/self/status").read_text("ascii").splitlines()
+        return 1024 * int(next(line for line in lines if line.startswith("VmHWM:")).split()[1])
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak if sys.platform == "darwin" else peak * 1024
