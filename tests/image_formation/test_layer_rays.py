@@ -13,7 +13,6 @@ from optical_paths import aperture, path, sensor
 from vcam_cli import simulate
 from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.image_formation.layers import layered, ray_windows
-from vcam_cli.image_formation.layers.layer_edges import _extremes
 from vcam_cli.image_formation.layers.occlusion import RayLayer, covariance, rays
 from vcam_cli.image_formation.layers.ray_cells import Cells, SharpImage, Window
 from vcam_cli.image_formation.layers.ray_windows import LEVELS, _Sum, _too_coarse, windows_with
@@ -22,6 +21,7 @@ from vcam_cli.physics import zernike
 from vcam_cli.physics.aberration import otf_ratio_symmetric
 from vcam_cli.physics.diffraction import otf_circular
 from vcam_cli.physics.opening import Opening
+from vcam_cli.scenes.cells import window_extremes
 
 LARGE = {"array.rows": 150, "array.columns": 190}
 """So that there are some windows."""
@@ -192,7 +192,7 @@ def test_extremes_are_those_of_every_window(size):
     plane = np.random.default_rng(1).random((40, 50))
     windows = np.lib.stride_tricks.sliding_window_view(plane, size)
     for larger, expected in ((np.maximum, windows.max((2, 3))), (np.minimum, windows.min((2, 3)))):
-        np.testing.assert_array_equal(_extremes(larger, plane, size), expected)
+        np.testing.assert_array_equal(window_extremes(larger, plane, size), expected)
 
 
 @pytest.mark.parametrize("divided", [(1.0, 1.0), (0.6, 1.0), (0.3, 0.85)])

@@ -14,7 +14,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.parallel import pieces
 from vcam_cli.scenes.base import Chart, ChartScene, Frame, Scene, View
-from vcam_cli.scenes.cells import means_of_parts
+from vcam_cli.scenes.cells import means_of_parts, window_extremes
 from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, total_energy
 from vcam_cli.scenes.framed import chart_scene
@@ -210,22 +210,24 @@ class WarpedLayer(WarpedChart):
         They are those of all flat cells that a cell may see: about the one where its center looks,
         up to half its diagonal at the largest scale away, and one more.
         """
-        from scipy.ndimage import maximum_filter, minimum_filter
-
         pitches = [float(edges[-1] - edges[0]) / (len(edges) - 1) for edges in (x_edges, y_edges)]
         centers = ((edges[1:] + edges[:-1]) / 2 for edges in (x_edges, y_edges))
         seen, pitch = self.sees.on_grid(*centers), min(pitches)
         far = math.ceil(self.sees.scales[1] * math.hypot(*pitches) / 2 / pitch) + 1
         edges, index = [], []
         for at in seen:
-            first = float(at.min()) - far * pitch
+            first = float(at.min()) - (far + 1) * pitch
             count = math.ceil((float(at.max()) - first) / pitch) + far + 1
             edges.append(first + pitch * np.arange(count + 1))
-            index.append(((at - first) / pitch).astype(int))
-        low, high = self.chart.opacity_ends(*edges)
-        size = 2 * far + 1
-        least, most = minimum_filter(low, size), maximum_filter(high, size)
-        return least[index[1], index[0]], most[index[1], index[0]]
+            index.append(((at - first) / pitch).astype(int) - far)
+        size = 2 * far + 1, 2 * far + 1
+        low, high = (
+            window_extremes(pick, plane, size)[index[1], index[0]]
+            for pick, plane in zip(
+                (np.minimum, np.maximum), self.chart.opacity_ends(*edges), strict=True
+            )
+        )
+        return low, high
 
 
 @dataclass(frozen=True)
