@@ -67,8 +67,7 @@ class TableSize:
         most = LARGEST_PLANE
         if tables is not None:
             most = max(most, math.isqrt(PLANE_VALUES // (len(PARITIES) * tables)))
-        wanted = self.steps_per_period * self._periods(blurs) + 1
-        return int(min(max(wanted, SMALLEST_PLANE), most))
+        return int(min(max(self._wanted_entries(blurs), SMALLEST_PLANE), most))
 
     def plane_error(self, blurs: Sequence[PlaneTransfer], entries: int) -> float:
         """Return what a table of too few entries errs by, relative to the largest level.
@@ -78,7 +77,7 @@ class TableSize:
         Parameters
         ----------
         blurs : sequence of PlaneTransfer
-            The blurs in the table; () for no table.
+            The blurs in the table.
         entries : int
             Its entries along an axis.
 
@@ -87,17 +86,15 @@ class TableSize:
         float
             Error at one frequency; 0 where there are as many steps as required.
         """
-        if not blurs:
+        wanted = self._wanted_entries(blurs)
+        if entries >= int(wanted):
             return 0.0
-        wanted = self.steps_per_period * self._periods(blurs)
-        if entries >= int(wanted) + 1:
-            return 0.0
-        steps = self.steps_per_period * (entries - 1) / wanted
+        steps = self.steps_per_period * (entries - 1) / (wanted - 1)
         return float(min((2 * math.pi / steps) ** 4 / 384, 1.0))
 
-    def _periods(self, blurs: Sequence[PlaneTransfer]) -> float:
-        """Return the periods of the phase of the widest blur up to the highest frequency."""
-        return self.top * max(blur.reach for blur in blurs)
+    def _wanted_entries(self, blurs: Sequence[PlaneTransfer]) -> float:
+        """Return the entries that follow the phase of the widest blur to the highest frequency."""
+        return self.steps_per_period * self.top * max(blur.reach for blur in blurs) + 1
 
 
 Mixing = tuple[Array, float]
