@@ -201,7 +201,7 @@ def warped_layers(path: OpticalPath, scene: AnyScene) -> tuple[Layers, SpectrumR
     rest = _without_still(path, _about_the_middle(path, warps))
     seen = _SeenScene(path, scene, warps)
     found = [
-        image_layers(_share_of(rest, share), seen.at(wavelength))
+        image_layers(_share_of(rest, share), seen.scene_at(wavelength))
         for wavelength, share in _groups(rest, seen, warps)
     ]
     reports = [report for _, report in found]
@@ -232,7 +232,7 @@ class _SeenScene:
             return False
         return len(of_kind(still, Magnification)) == len(still)
 
-    def at(self, wavelength: float) -> AnyScene:
+    def scene_at(self, wavelength: float) -> AnyScene:
         """Return the scene as a wavelength shows it on the sensor."""
         if self.is_magnified:
             assert not isinstance(self.scene, LayeredScene)

@@ -19,7 +19,7 @@ from vcam_cli.effects.pixel_signal import Overflow, Retention
 from vcam_cli.effects.signal_chain import Limit, full_well
 from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.image_formation import photon_rate
-from vcam_cli.image_formation.estimates.memory_model import DISPARITY, HALVES
+from vcam_cli.image_formation.estimates.memory_model import half_image_bytes
 from vcam_cli.image_formation.neighbor_sharing import Sharing
 from vcam_cli.image_formation.optical_path import SpectrumReport
 from vcam_cli.image_formation.settings import Settings
@@ -198,7 +198,7 @@ def plan_frame(
     solved = seen.solved.at_gain(exposed.settings.gain)
     pixels, of_halves = solved.geometry.rows * solved.geometry.columns, 0
     if exposed.halves is not None:
-        of_halves = pixels * (HALVES + DISPARITY * solved.output.phase)
+        of_halves = half_image_bytes(pixels, solved.output.phase)
     decided = plan.make(
         solved.effects,
         solved.tolerance,

@@ -384,7 +384,7 @@ def _require_memory(solved: Solved) -> int:
 
 
 def _edge_pixels(solved: Solved) -> int:
-    """Return the most pixels of a color of which the response of a slanted edge is found."""
+    """Return the largest number of pixels that a slanted-edge response is computed from."""
     if not solved.has_edge:
         return 0
     pixels = solved.geometry.rows * solved.geometry.columns

@@ -244,8 +244,26 @@ def work_bytes(pixels: int, workers: int, transfers: int = 0) -> int:
     return workers * min(WORK + transfers * WORK_OF_TRANSFER, WORK_OF_PIXEL * pixels)
 
 
+def half_image_bytes(pixels: int, with_disparity: bool) -> int:
+    """Return the memory of the halves of pixels, beyond what their light takes.
+
+    Parameters
+    ----------
+    pixels : int
+        Pixels of the array.
+    with_disparity : bool
+        Whether both half images and their disparity are written.
+
+    Returns
+    -------
+    int
+        Bytes.
+    """
+    return pixels * (HALVES + DISPARITY * with_disparity)
+
+
 def composed_bytes(path: OpticalPath, layers: int) -> int:
-    """Return the memory of layers while they are put one before the other.
+    """Return the memory of layers that are composed.
 
     Parameters
     ----------
