@@ -131,8 +131,7 @@ def captures(
     study: str,
     limits: tuple[float, float],
     marks: Sequence[Any],
-    corner: tuple[float, float] = (0.3, 0.1),
-):
+) -> None:
     """Draw figures 4.3, 4.6 and 4.7, the pdf as an inset."""
     with TemporaryDirectory() as folder:
         methods = "methods=[optimal, heuristic, uniform, exponential]"
@@ -151,8 +150,8 @@ def captures(
     for x, y in marks:
         axes.plot(x, y, "o", color="black", ms=4, zorder=5)
     axes.set(xlim=(2, 20), ylim=limits, xlabel="captures", ylabel="E[SNR] / single")
-    axes.legend(fontsize=6, loc="lower right", ncols=2)
-    inset = axes.inset_axes((*corner, 0.2, 0.22))
+    axes.legend(fontsize=6, loc="lower right", ncols=3)
+    inset = axes.inset_axes((0.77, 0.19, 0.2, 0.2))
     for low, high, share in zip(pdf.low, pdf.high, pdf.probability, strict=True):
         inset.fill_between([low, high], 0, share / (high - low), color=COLORS[0], alpha=0.4)
     inset.set(xlim=(0, 1), ylim=(0, None))
@@ -239,9 +238,7 @@ PANELS: dict[str, Callable[[Any, Runs], None]] = {
     "4.6, pdf of 4.4": partial(
         captures, study="captures-two-segments", limits=(1, 2.05), marks=[]
     ),
-    "4.7": partial(
-        captures, study="captures-three-segments", limits=(1, 9), marks=[], corner=(0.76, 0.24)
-    ),
+    "4.7": partial(captures, study="captures-three-segments", limits=(1, 9), marks=[]),
     "4.10": segments,
     "4.11, stated": scene_of_twelve_bits,
     "4.13, four captures and one": dark_room,
