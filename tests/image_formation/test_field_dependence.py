@@ -84,6 +84,7 @@ def test_every_pixel_has_its_own_wavefront(knobs, name, truths):
 
 
 COPIES = 1.6e-6, 1.1e-6
+FAR = 300e-6
 
 
 @pytest.mark.parametrize(
@@ -91,6 +92,10 @@ COPIES = 1.6e-6, 1.1e-6
     [
         pytest.param(
             ObliqueLowPass, (COPIES,), ((0.8e-6, 0.55e-6), (-0.8e-6, -0.55e-6)), id="oblique"
+        ),
+        # 10 times the tolerance where their product with the lens was a table
+        pytest.param(
+            ObliqueLowPass, ((2 * FAR, FAR),), ((FAR, FAR / 2), (-FAR, -FAR / 2)), id="far"
         ),
         pytest.param(
             LowPassAlongAxes,

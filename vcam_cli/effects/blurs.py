@@ -288,6 +288,20 @@ class PlaneTransfer(Blur):
         raise TypeError(f"{type(self).__name__} has no harmonics of the direction")
 
 
+class GeometricTransfer(PlaneTransfer):
+    """A transfer function of both components that is elementary and the same at every wavelength.
+
+    It is computed at each frequency of a spectrum, and needs no table.
+    """
+
+    is_symmetric = False
+    """Whether the blur is symmetric about a point, so that its transfer is real."""
+
+    def cutoff(self, wavelength: float) -> float:
+        """Return inf: no frequency from which the transfer is zero [cycles/m]."""
+        return np.inf
+
+
 @dataclass(frozen=True)
 class Zone:
     """A blur, and how much of it there is in every place of the sensor."""

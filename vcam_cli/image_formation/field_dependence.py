@@ -28,11 +28,9 @@ from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.blurs import Blur, PlaneTransfer, Zone
 from vcam_cli.image_formation.filtering import Filter
 from vcam_cli.image_formation.optical_path import Layer
-from vcam_cli.image_formation.plane_products import product_entries, times_blurs
 from vcam_cli.image_formation.scene_spectrum import SceneSpectrum
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.image_formation.transfer_tables import (
-    LARGEST_PLANE,
     Mixing,
     Tables,
     TableSize,
@@ -126,8 +124,8 @@ def _change(uniform_transfer: Transfer, blur: Blur, frequency: Array) -> Array:
     """Return what a blur adds to a transfer, by harmonics of the direction (m, K, C, n) [e/s].
 
     They are complex, see `direction_harmonics`. What depends on the direction is small: it is
-    computed at every second wavelength. The transfer is its radial part, which `times_blurs`
-    multiplies by that of its blurs with a direction.
+    computed at every second wavelength. The transfer is its radial part; its blurs with a direction
+    are `Tables.factors`.
     """
     directed = of_kind([blur], PlaneTransfer)
     if not directed:
@@ -187,17 +185,14 @@ def tabulate_field(
     weights = np.array([m.values for m in maps])
     azimuth = maps[0].azimuth
 
-    def through(tables: Tables) -> Tables:
-        if not (uniform := uniform_transfer.plane_blurs):
-            return tables
-        entries = product_entries(uniform, rings, size)
-        return times_blurs(tables, uniform, entries, float(uniform_transfer.wavelengths[0]))
+    table = partial(
+        Tables, mix, top=size.top, error=error, factors=uniform_transfer.geometric_blurs
+    )
 
     def tables(family: Family, is_sine: bool, share: Array) -> Tables:
-        table = _resampled(family.table(changes, share), base.shape[-1])
+        radial = _resampled(family.table(changes, share), base.shape[-1])
         sign = -1 if family.order % 2 or is_sine else 1  # of a wave, by `split_by_parity`
-        order = family.order
-        return through(Tables(mix, sign * table, size.top, error, order=order, is_sine=is_sine))
+        return table(sign * radial, order=family.order, is_sine=is_sine)
 
     modes = []
     for family, share in families:
@@ -207,11 +202,14 @@ def tabulate_field(
             for is_sine, turned in family.turned(azimuth)
         ]
     mean = _resampled(np.mean([change[0].real for change in changes], axis=0), base.shape[-1])
-    return through(Tables(mix, base + mean, size.top, error)), tuple(modes)
+    return table(base + mean), tuple(modes)
 
 
 def ring_entries(rings: Sequence[Zone], size: TableSize) -> int:
     """Return the entries over |f| at which the blurs of a field are computed.
+
+    Twice as many steps in a period as tables over fx and fy have: they follow the phase of the
+    outermost rays, whose light is little: behind f/4 a quarter of them served coma of 2 waves.
 
     Parameters
     ----------
@@ -228,7 +226,7 @@ def ring_entries(rings: Sequence[Zone], size: TableSize) -> int:
     directed = of_kind([ring.blur for ring in rings], PlaneTransfer)
     if not directed:
         return size.entries
-    return min(2 * size.plane_entries(directed) - 1, LARGEST_PLANE, size.entries)
+    return min(2 * size.wanted_entries(directed) - 1, size.entries)
 
 
 @dataclass(frozen=True)

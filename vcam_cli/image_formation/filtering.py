@@ -216,12 +216,17 @@ class Filter:
         """
         if not self.is_even:
             raise ValueError("a filter that turns cosines into sines is no single factor")
-        parts = self.tables.radial, self.tables.planes[0]
+        radial, plane = self.tables.radial, self.tables.planes[0]
         ones = _Ones(self.x.samples)
         for mixture in range(self.tables.shape[0]):
-            radial, plane = (None if p is None else p[mixture : mixture + 1] for p in parts)
-            mix = self.tables.mix[mixture : mixture + 1]
-            alone = replace(self.tables, mix=mix, radial=radial, planes=(plane, None, None, None))
+            only = slice(mixture, mixture + 1)
+            of_plane = None if plane is None else plane[only]
+            alone = replace(
+                self.tables,
+                mix=self.tables.mix[only],
+                radial=radial[only],
+                planes=(of_plane, None, None, None),
+            )
             table = reader(alone, 0, self.x.frequencies)
             one = replace(self, tables=alone)
             for rows in pieces(self.y.folded_terms, LONGEST):

@@ -249,8 +249,8 @@ def _spectral_layers(
     followed = far.parts_with_modes(path.full) if modes else 0
     planes = [plane for plane in tables.planes if plane is not None]
     coarse = 0.0
-    if planes and not field_rings:  # detail is at most half as strong as light from 0 to the peak
-        coarse = size.plane_error(exact.plane_blurs, planes[0].shape[-1]) * image.peak / 2
+    if planes:  # detail is at most half as strong as light from 0 to the peak
+        coarse = size.plane_error(exact.tabulated_blurs, planes[0].shape[-1]) * image.peak / 2
     report = SpectrumReport(
         oversampling=image.highest,
         lost_rms=math.hypot(

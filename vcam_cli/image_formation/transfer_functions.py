@@ -22,7 +22,7 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.effects.base import Effect, of_kind
-from vcam_cli.effects.blurs import Blur, PlaneTransfer, RadialTransfer
+from vcam_cli.effects.blurs import Blur, GeometricTransfer, PlaneTransfer, RadialTransfer
 from vcam_cli.parallel import pieces, product
 from vcam_cli.physics.cache import ByteCache, remembered
 from vcam_cli.spectra import Spectrum, pair_weights, photons
@@ -71,6 +71,16 @@ class Transfer:
     def plane_blurs(self) -> tuple[PlaneTransfer, ...]:
         """Blurs that depend on the direction too."""
         return of_kind(self.effects, PlaneTransfer)
+
+    @property
+    def geometric_blurs(self) -> tuple[GeometricTransfer, ...]:
+        """Those of them that are computed at each frequency of a spectrum."""
+        return of_kind(self.effects, GeometricTransfer)
+
+    @property
+    def tabulated_blurs(self) -> tuple[PlaneTransfer, ...]:
+        """Those of them that are tabulated over fx and fy."""
+        return tuple(e for e in self.plane_blurs if e not in self.geometric_blurs)
 
     @cached_property
     def key(self) -> Hashable | None:

@@ -3,7 +3,8 @@
 The radial part of a transfer function is a table over |f| with linear interpolation. What a blur
 with a direction (coma, a measured point spread function) changes is tabulated over fx and fy by
 parity, with cubic splines between the entries; it begins with the square of the frequency, so a
-coarse table will do.
+coarse table will do. Blurs that are the same at every wavelength (motion, a low-pass filter along a
+diagonal) are no tables: they are computed at each frequency, and multiply what is read.
 """
 
 from __future__ import annotations
@@ -16,18 +17,22 @@ from typing import Any
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.effects.blurs import Blur, PlaneTransfer
+from vcam_cli.effects.blurs import Blur, GeometricTransfer, PlaneTransfer
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.parallel import product, slices_within
 from vcam_cli.physics.cache import ByteCache
 
 PARITIES = ((False, False), (True, True), (True, False), (False, True))
 """Whether a transfer function turns the cosines along x, and along y, into sines."""
+UNITS = (1, -1, -1j, -1j)
+"""Factor of each of them in the complex transfer function."""
+ANY_WAVELENGTH = 550e-9
+"""Wavelength at which blurs are computed that are the same at all [m]."""
 SMALLEST_PLANE, LARGEST_PLANE = 41, 513
 """Entries along an axis of a table over fx and fy, at least and, of many tables, at most."""
 PLANE_VALUES = 1 << 25
 """Entries of all tables over fx and fy, at most, where one has more than `LARGEST_PLANE` along an
-axis: 268 MB. With 513 an image that moves by six pixels erred by 0.1 % at a tolerance of 0.02 %."""
+axis: 268 MB. With 513 a blur over six pixels erred by 0.1 % at a tolerance of 0.02 %."""
 ROWS_VALUES = 1 << 22
 """Transfers by wavelength that are computed at once for such a table, about: 64 MB."""
 JUDGED = 256
@@ -49,25 +54,23 @@ class TableSize:
     rank: int | None = None
     """Largest number of mixtures; None: as many as the tolerance requires."""
 
-    def plane_entries(self, blurs: Sequence[PlaneTransfer], tables: int | None = None) -> int:
+    def plane_entries(self, blurs: Sequence[PlaneTransfer], tables: int) -> int:
         """Return the entries along an axis of a table over fx and fy for these blurs.
 
         Parameters
         ----------
         blurs : sequence of PlaneTransfer
             These blurs.
-        tables : int, optional
-            Tables of each parity: mixtures times colors. By default many.
+        tables : int
+            Tables of each parity: mixtures times colors.
 
         Returns
         -------
         int
             Entries, from `SMALLEST_PLANE` to `LARGEST_PLANE`, or as many as `PLANE_VALUES` allow.
         """
-        most = LARGEST_PLANE
-        if tables is not None:
-            most = max(most, math.isqrt(PLANE_VALUES // (len(PARITIES) * tables)))
-        return int(min(max(self._wanted_entries(blurs), SMALLEST_PLANE), most))
+        most = max(LARGEST_PLANE, math.isqrt(PLANE_VALUES // (len(PARITIES) * tables)))
+        return min(self.wanted_entries(blurs), most)
 
     def plane_error(self, blurs: Sequence[PlaneTransfer], entries: int) -> float:
         """Return what a table of too few entries errs by, relative to the largest level.
@@ -86,15 +89,27 @@ class TableSize:
         float
             Error at one frequency; 0 where there are as many steps as required.
         """
-        wanted = self._wanted_entries(blurs)
-        if entries >= int(wanted):
+        wanted = self.wanted_entries(blurs)
+        if entries >= wanted:
             return 0.0
         steps = self.steps_per_period * (entries - 1) / (wanted - 1)
         return float(min((2 * math.pi / steps) ** 4 / 384, 1.0))
 
-    def _wanted_entries(self, blurs: Sequence[PlaneTransfer]) -> float:
-        """Return the entries that follow the phase of the widest blur to the highest frequency."""
-        return self.steps_per_period * self.top * max(blur.reach for blur in blurs) + 1
+    def wanted_entries(self, blurs: Sequence[PlaneTransfer]) -> int:
+        """Return the entries that follow the phase of the widest blur to the highest frequency.
+
+        Parameters
+        ----------
+        blurs : sequence of PlaneTransfer
+            The blurs in the table.
+
+        Returns
+        -------
+        int
+            Entries from 0 to the highest frequency, at least `SMALLEST_PLANE`.
+        """
+        steps = self.steps_per_period * self.top * max(blur.reach for blur in blurs)
+        return max(int(steps + 1), SMALLEST_PLANE)
 
 
 Mixing = tuple[Array, float]
@@ -110,8 +125,8 @@ class Tables:
 
     mix: Array
     """(R, K) without unit."""
-    radial: Array | None
-    """(R, C, n) over |f| from 0 to `top` [electrons / s]; None where there is no such part."""
+    radial: Array
+    """(R, C, n) over |f| from 0 to `top` [electrons / s]."""
     top: float
     """Frequency of the last entry [cycles/m]."""
     error: float
@@ -123,13 +138,15 @@ class Tables:
     """The radial part is times the cosine of `order` times the direction of f from x towards y,"""
     is_sine: bool = False
     """or times its sine, and has the parity that it thereby has."""
+    factors: tuple[GeometricTransfer, ...] = ()
+    """Blurs that multiply all of this, computed at each frequency that is read."""
+    is_change: bool = False
+    """Whether the radial part is subtracted in the end: what blurs with a direction change."""
 
     @property
     def shape(self) -> tuple[int, int]:
         """Numbers of mixtures R and colors C."""
-        parts = (self.radial, *self.planes)
-        found = next(part for part in parts if part is not None)
-        return found.shape[0], found.shape[1]
+        return self.radial.shape[0], self.radial.shape[1]
 
     @property
     def colors(self) -> int:
@@ -138,7 +155,7 @@ class Tables:
 
     @property
     def is_radial(self) -> bool:
-        """Whether no blur has a direction: such tables are small."""
+        """Whether all tables are over |f|: such tables are small."""
         return all(plane is None for plane in self.planes)
 
     @property
@@ -162,15 +179,28 @@ class Tables:
         only = slice(color, color + 1)
         return replace(
             self,
-            radial=None if self.radial is None else self.radial[:, only],
+            radial=self.radial[:, only],
             planes=tuple(None if plane is None else plane[:, only] for plane in self.planes),
         )
 
     @property
     def parities(self) -> list[int]:
         """Indices of the `PARITIES` that occur."""
+        own, factors = self.tabulated_parities, self.factor_parities
+        return sorted({parity_of_product(one, other) for one in own for other in factors})
+
+    @property
+    def tabulated_parities(self) -> list[int]:
+        """Indices of the `PARITIES` of the tables, without factors."""
         directed = {p for p, plane in enumerate(self.planes) if plane is not None}
-        return sorted(directed | ({self.radial_parity} if self.radial is not None else set()))
+        return sorted(directed | {self.radial_parity})
+
+    @property
+    def factor_parities(self) -> tuple[int, ...]:
+        """Indices of the `PARITIES` of the factors."""
+        if not self.factors:
+            return (0,)
+        return (0, 1) if all(blur.is_symmetric for blur in self.factors) else (0, 1, 2, 3)
 
     @property
     def radial_parity(self) -> int:
@@ -178,21 +208,52 @@ class Tables:
         odd_y = self.is_sine
         return PARITIES.index((odd_y != bool(self.order % 2), odd_y))
 
+    def factor(self, fx: Array, fy: Array) -> Array:
+        """Return the product of the factors, by `PARITIES`.
+
+        Parameters
+        ----------
+        fx, fy : Array
+            Frequencies (n,) along x and (m,) along y [cycles/m].
+
+        Returns
+        -------
+        Array
+            Transfer (4, m, n) without unit.
+        """
+        both = np.ones((2 * len(fy), len(fx)), np.complex128)
+        for blur in self.factors:
+            both *= blur.otf_plane(fx, np.concatenate([fy, -fy]), ANY_WAVELENGTH)
+        return split_by_parity(both[: len(fy)], both[len(fy) :])
+
+
+def parity_of_product(one: int, other: int) -> int:
+    """Return the parity of a product of transfer functions.
+
+    Parameters
+    ----------
+    one, other : int
+        Indices into `PARITIES` of the factors.
+
+    Returns
+    -------
+    int
+        Index into `PARITIES` of the product.
+    """
+    (x, y), (other_x, other_y) = PARITIES[one], PARITIES[other]
+    return PARITIES.index((x != other_x, y != other_y))
+
 
 @dataclass(frozen=True, eq=False)
 class TableReader:
-    """Tables of one parity, interpolated at given frequencies along x."""
+    """Transfer functions of one parity, at given frequencies along x."""
 
     tables: Tables
+    parity: int
     fx: Array
     """(n,) rising [cycles/m]."""
-    radial: tuple[Array, Array] | None
-    """Entries over |f| (R, C, entries) and the steps to the next; None where this parity has no
-    radial part."""
-    plane: Array | None
-    """Spline coefficients (R, C, m, m) over fy and fx, where there is such a part."""
-    spline_x: Any
-    """Sparse (n, m): what each of them counts along x, four at a time."""
+    parts: dict[int, PartReader]
+    """Tables of each parity that has a share in it."""
 
     def values(self, fy: Array, count: int | None = None) -> Array:
         """Return H_rc at some frequencies along y.
@@ -207,42 +268,73 @@ class TableReader:
         Returns
         -------
         Array
-            Transfer (R, C, m, count) [e/s]; with a direction, nothing beyond the end of the tables.
+            Transfer (R, C, m, count) [e/s]; planes add nothing beyond the end of the tables.
         """
-        fx, top = self.fx[:count], self.tables.top
-        total: Array | None = None
-        radius = np.hypot(fx, fy[:, None])
-        if self.radial is not None:
-            total = self._linear(radius)
-            if self.tables.order:
-                angle = self.tables.order * np.arctan2(fy[:, None], fx)
-                total *= np.sin(angle) if self.tables.is_sine else np.cos(angle)
-        if self.plane is not None and self.spline_x is not None:
-            along_y = spline_weights(self.plane.shape[-1], fy / top)
-            near = slice(along_y.indices.min(), along_y.indices.max() + 1)
-            rows = along_y.toarray()[:, near] @ self.plane[..., near, :]
-            flat = rows.reshape(-1, rows.shape[-1])
-            on_top = (self.spline_x[: len(fx)] @ flat.T).T.reshape(*rows.shape[:-1], len(fx))
-            total = (on_top if total is None else total + on_top) * (radius <= top)
-        assert total is not None
+        fx = self.fx[:count]
+        if self.tables.factors:
+            total = self._product(fx, fy)
+        else:
+            total = self.parts[self.parity].values(fx, fy)
+        if self.tables.is_change and self.parity == self.tables.radial_parity:
+            total -= self.parts[self.parity].radial_values(fx, fy)
         return total
 
-    def _linear(self, radius: Array) -> Array:
-        """Return the radial part at frequencies (m, n); its last entry holds beyond its end."""
+    def _product(self, fx: Array, fy: Array) -> Array:
+        factor = self.tables.factor(fx, fy)
+        total = np.zeros((*self.tables.shape, len(fy), len(fx)))
+        for own, part in self.parts.items():
+            other = parity_of_product(own, self.parity)
+            sign = (UNITS[own] * UNITS[other] / UNITS[self.parity]).real
+            total += part.values(fx, fy) * (sign * factor[other])
+        return total
+
+
+@dataclass(frozen=True, eq=False)
+class PartReader:
+    """Tables of one parity, interpolated."""
+
+    tables: Tables
+    radial: tuple[Array, Array] | None
+    """Entries over |f| (R, C, entries) and the steps to the next; None where this parity has no
+    radial part."""
+    plane: Array | None
+    """Spline coefficients (R, C, m, m) over fy and fx, where there is such a part."""
+    spline_x: Any
+    """Sparse (n, m): what each of them counts at frequencies along x, four at a time."""
+
+    def values(self, fx: Array, fy: Array) -> Array:
+        """Return the tables at the first frequencies along x (n,) and at fy (m,): (R, C, m, n)."""
+        if self.plane is None:
+            return self.radial_values(fx, fy)
+        along_y = spline_weights(self.plane.shape[-1], fy / self.tables.top)
+        near = slice(along_y.indices.min(), along_y.indices.max() + 1)
+        rows = along_y.toarray()[:, near] @ self.plane[..., near, :]
+        flat = rows.reshape(-1, rows.shape[-1])
+        total: Array = (self.spline_x[: len(fx)] @ flat.T).T.reshape(*rows.shape[:-1], len(fx))
+        if self.radial is not None:
+            total += self.radial_values(fx, fy)
+        total *= np.hypot(fx, fy[:, None]) <= self.tables.top
+        return total
+
+    def radial_values(self, fx: Array, fy: Array) -> Array:
+        """Return the part over |f| at frequencies (n,) and (m,); its end holds beyond it."""
         assert self.radial is not None
-        entries, steps = self.radial
+        tables, (entries, steps) = self.tables, self.radial
         last = steps.shape[-1]
-        position = np.minimum(radius.ravel() * (last / self.tables.top), last)
+        position = np.minimum(np.hypot(fx, fy[:, None]).ravel() * (last / tables.top), last)
         index = np.minimum(position.astype(np.intp), last - 1)
         values = steps.take(index, axis=-1)
         values *= position - index
         values += entries.take(index, axis=-1)
-        shaped: Array = values.reshape(*self.tables.shape, *radius.shape)
+        shaped: Array = values.reshape(*tables.shape, len(fy), len(fx))
+        if tables.order:
+            angle = tables.order * np.arctan2(fy[:, None], fx)
+            shaped *= np.sin(angle) if tables.is_sine else np.cos(angle)
         return shaped
 
 
 def reader(tables: Tables, parity: int, fx: Array) -> TableReader:
-    """Return a reader of the tables of one parity.
+    """Return a reader of the transfer functions of one parity.
 
     Parameters
     ----------
@@ -258,13 +350,22 @@ def reader(tables: Tables, parity: int, fx: Array) -> TableReader:
     TableReader
         The reader.
     """
+    parts = {
+        own: _part_reader(tables, own, fx)
+        for own in tables.tabulated_parities
+        if parity_of_product(own, parity) in tables.factor_parities
+    }
+    return TableReader(tables, parity, fx, parts)
+
+
+def _part_reader(tables: Tables, parity: int, fx: Array) -> PartReader:
     plane, radial = tables.planes[parity], None
-    if parity == tables.radial_parity and tables.radial is not None:
+    if parity == tables.radial_parity:
         radial = tables.radial, np.diff(tables.radial)
     if plane is None:
-        return TableReader(tables, fx, radial, None, None)
+        return PartReader(tables, radial, None, None)
     spline = spline_weights(plane.shape[-1], fx / tables.top)
-    return TableReader(tables, fx, radial, _spline_coefficients(plane), spline)
+    return PartReader(tables, radial, _spline_coefficients(plane), spline)
 
 
 def _spline_coefficients(plane: Array) -> Array:
@@ -330,11 +431,11 @@ is known, too: `strategies.picture_filter`."""
 def _tabulated(exact: Transfer, size: TableSize, mixing: Mixing) -> Tables:
     mix, error = mixing
     mixed = exact.with_mixtures(mix)
-    tables = Tables(mix, radial_table(mixed, size), size.top, error)
-    if exact.plane_blurs:
-        entries = size.plane_entries(mixed.plane_blurs, math.prod(mixed.weights.shape[:2]))
+    tables = Tables(mix, radial_table(mixed, size), size.top, error, factors=exact.geometric_blurs)
+    if blurs := exact.tabulated_blurs:
+        entries = size.plane_entries(blurs, math.prod(mixed.weights.shape[:2]))
         grid = plane_grid(mixed, size.top, entries)
-        parts = grid.change(mixed.plane_blurs)
+        parts = grid.change(blurs)
         planes = tuple(part if np.any(part) else None for part in parts)
         tables = replace(tables, planes=planes)
     return tables
@@ -453,23 +554,6 @@ def split_by_parity(plus: Array, minus: Array) -> Array:
             (minus.imag - plus.imag) / 2,
         ]
     )
-
-
-def joined_parities(parts: Array) -> tuple[Array, Array]:
-    """Return a transfer function at (fx, fy) and at (fx, -fy) from its parts by `PARITIES`.
-
-    Parameters
-    ----------
-    parts : Array
-        Real parts (4, *shape), from `split_by_parity`.
-
-    Returns
-    -------
-    tuple of Array
-        Complex values (*shape) at (fx, fy) and at (fx, -fy).
-    """
-    even, both, along_x, along_y = parts
-    return even - both - 1j * (along_x + along_y), even + both + 1j * (along_y - along_x)
 
 
 def plane_grid(transfer: Transfer, top: float, entries: int) -> PlaneGrid:

@@ -18,7 +18,7 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.effects.base import Effect
-from vcam_cli.effects.blurs import PlaneTransfer
+from vcam_cli.effects.blurs import GeometricTransfer
 from vcam_cli.effects.optics.wavefront_blur import AberrationBlur
 
 LEFT, RIGHT = 1, -1
@@ -29,7 +29,7 @@ LEAST = 1e-9
 
 
 @dataclass(frozen=True)
-class HalfPupil(AberrationBlur, PlaneTransfer):
+class HalfPupil(AberrationBlur, GeometricTransfer):
     """Defocus seen through one half of a round pupil, in place of the lens's aberrations.
 
     Diffraction is a factor beside it, as that of the whole lens: by a half, contrast across the
@@ -56,10 +56,6 @@ class HalfPupil(AberrationBlur, PlaneTransfer):
     def reach(self) -> float:
         """How far the blur throws light [m]."""
         return abs(self.radius)
-
-    def cutoff(self, wavelength: float) -> float:
-        """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
-        return np.inf
 
     def otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
         """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: (m, n)."""

@@ -22,7 +22,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import Effect
-from vcam_cli.effects.blurs import PlaneTransfer, SeparableTransfer
+from vcam_cli.effects.blurs import GeometricTransfer, SeparableTransfer
 
 Vectors = tuple[tuple[float, float], ...]
 
@@ -102,12 +102,10 @@ class LowPassAlongAxes(Plates, SeparableTransfer):
 
 
 @dataclass(frozen=True)
-class ObliqueLowPass(Plates, PlaneTransfer):
+class ObliqueLowPass(Plates, GeometricTransfer):
     """Plates that displace in any direction."""
 
-    def cutoff(self, wavelength: float) -> float:
-        """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
-        return math.inf
+    is_symmetric = True
 
     def otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
         """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: (m, n)."""

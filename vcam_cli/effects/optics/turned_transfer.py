@@ -10,11 +10,11 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.blurs import PlaneTransfer, SeparableTransfer
+from vcam_cli.effects.blurs import GeometricTransfer, SeparableTransfer
 
 
 @dataclass(frozen=True)
-class TurnedTransfer(PlaneTransfer):
+class TurnedTransfer(GeometricTransfer):
     """A separable transfer as a scene meets it that is turned by an angle."""
 
     still: SeparableTransfer
@@ -22,6 +22,7 @@ class TurnedTransfer(PlaneTransfer):
     """Turn of the scene, clockwise [rad]."""
 
     absent = ""
+    is_symmetric = True
 
     @property
     def name(self) -> str:  # type: ignore[override]
@@ -41,10 +42,6 @@ class TurnedTransfer(PlaneTransfer):
     def describe(self) -> str:
         """Return what the effect does."""
         return self.still.describe()
-
-    def cutoff(self, wavelength: float) -> float:
-        """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
-        return math.inf
 
     @property
     def reach(self) -> float:

@@ -24,7 +24,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.image_motion import ExposedMotion, exposed_motion
 from vcam_cli.effects.base import Effect
-from vcam_cli.effects.blurs import PlaneTransfer, SeparableTransfer
+from vcam_cli.effects.blurs import GeometricTransfer, SeparableTransfer
 from vcam_cli.effects.temporal.sub_exposed_motion import SubExposedMotion
 from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.physics.motion_blur import path_transfer
@@ -137,17 +137,15 @@ class MotionAlongAxis(EvenMotion, SeparableTransfer):
 
 
 @dataclass(frozen=True)
-class ObliqueMotion(EvenMotion, PlaneTransfer):
+class ObliqueMotion(EvenMotion, GeometricTransfer):
     """Motion in any other direction."""
+
+    is_symmetric = True
 
     @property
     def reach(self) -> float:
         """How far the blur throws light [m]."""
         return 0.5 * float(np.hypot(*self.path))
-
-    def cutoff(self, wavelength: float) -> float:
-        """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
-        return np.inf
 
     def otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
         """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: (m, n)."""
@@ -160,7 +158,7 @@ class ObliqueMotion(EvenMotion, PlaneTransfer):
 
 
 @dataclass(frozen=True)
-class RecordedMotion(ImageMotion, PlaneTransfer, Motion):
+class RecordedMotion(ImageMotion, GeometricTransfer, Motion):
     """An image that goes any path while all pixels are exposed: the path's own transfer.
 
     The path is straight between the times of its record. Its mean is a displacement.
@@ -217,10 +215,6 @@ class RecordedMotion(ImageMotion, PlaneTransfer, Motion):
         """Return the motion from `start` to `stop` after the exposure begins [s]."""
         exposed = self.exposed.part_of_exposure(start, stop)
         return RecordedMotion(exposed, self.width, self.height, self.pitch)
-
-    def cutoff(self, wavelength: float) -> float:
-        """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
-        return np.inf
 
     def otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
         """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: (m, n)."""

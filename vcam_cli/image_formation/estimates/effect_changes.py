@@ -69,7 +69,6 @@ def _omission_tables(
 ) -> Tables:
     """Return the radial part with fewer transfer functions, less the whole of it."""
     whole = image.tables.radial
-    assert whole is not None
     others = path.transfer.with_effects(radial).with_mixtures(image.tables.mix)
     size = TableSize(image.tables.top, whole.shape[-1], 0.0, 0.0)
     return replace(image.tables, radial=radial_table(others, size) - whole)
@@ -77,8 +76,8 @@ def _omission_tables(
 
 def _directional_tables(path: OpticalPath, tables: Tables) -> Tables:
     """Return what a blur with a direction, or the mean of one that changes over the field, adds."""
-    if any(plane is not None for plane in tables.planes) or tables.radial is None:
-        return replace(tables, radial=None)
+    if tables.factors or not tables.is_radial:
+        return replace(tables, is_change=True)
     uniform_transfer = path.transfer.with_mixtures(tables.mix)
     size = TableSize(tables.top, tables.radial.shape[-1], 0.0, 0.0)
     return replace(tables, radial=tables.radial - radial_table(uniform_transfer, size))

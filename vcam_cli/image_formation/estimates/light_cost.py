@@ -12,7 +12,13 @@ from dataclasses import astuple, dataclass, field, replace
 
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import Effect, of_kind
-from vcam_cli.effects.blurs import Blur, FieldTransfer, PlaneTransfer, SeparableTransfer
+from vcam_cli.effects.blurs import (
+    Blur,
+    FieldTransfer,
+    GeometricTransfer,
+    PlaneTransfer,
+    SeparableTransfer,
+)
 from vcam_cli.effects.warps import Magnification, StillWarp, Warp
 from vcam_cli.image_formation.estimates import memory_model
 from vcam_cli.image_formation.estimates.bandwidth import FREQUENCY_SHARE, highest_passed, reach
@@ -264,7 +270,9 @@ class LightCost:
 
     def _image_seconds(self, blurs: Sequence[Effect]) -> float:
         # Waves need their transfer at their own frequencies alone, no table of it.
-        tabulated = () if isinstance(self.scene, WAVES) else of_kind(blurs, Blur, FieldTransfer)
+        every = () if isinstance(self.scene, WAVES) else of_kind(blurs, Blur, FieldTransfer)
+        computed = of_kind(every, GeometricTransfer)
+        tabulated = [blur for blur in every if blur not in computed]
         lines = len(tabulated) + (DIRECTED - 1) * len(of_kind(tabulated, PlaneTransfer))
         otfs = lines * OTF * ENTRIES * len(self.path.transfer.wavelengths)
         still, g = of_kind(blurs, StillWarp), self.path.geometry
@@ -297,14 +305,14 @@ def expected_report(
         return SpectrumReport()
     planes = min(PLANES, len(path.transfer.weights))
     found = _sampled(path, scene, planes)
-    directed = bool(of_kind(path.transfer.effects, PlaneTransfer))
+    directed = bool(path.transfer.plane_blurs)
     filters = MODES if path.field else PARITIES if directed else 1
     return replace(
         found,
         planes=planes,
         filters=filters,
         far_filters=filters * found.far_filters,
-        table_values=ENTRIES_OF_PLANE**2 * planes * directed,
+        table_values=ENTRIES_OF_PLANE**2 * planes * bool(path.transfer.tabulated_blurs),
         has_field=path.field is not None,
         field_seconds=path.field.table_seconds if path.field else 0.0,
         is_sheared=any(path.drift),

@@ -17,7 +17,6 @@ from vcam_cli.image_formation.estimates.bandwidth import axes
 from vcam_cli.image_formation.far_field import FarPart
 from vcam_cli.image_formation.field_dependence import ring_entries
 from vcam_cli.image_formation.optical_path import OpticalPath
-from vcam_cli.image_formation.plane_products import product_entries
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.transfer_tables import (
     PARITIES,
@@ -166,11 +165,8 @@ def table_bytes(path: OpticalPath, planes: int, size: TableSize) -> int:
     colors = len(path.mosaic.colors)
     light = path.transfer.with_half_the_wavelengths().wavelengths
     of_blurs = 0
-    if directed := path.transfer.plane_blurs:
-        if path.field_rings:
-            entries = product_entries(directed, path.field_rings, size)
-        else:
-            entries = size.plane_entries(directed, planes * colors)
+    if directed := path.transfer.tabulated_blurs:
+        entries = size.plane_entries(directed, planes * colors)
         per_table = entries**2 * planes * colors * len(PARITIES)
         # by wavelength, by parity, and copies of the latter
         by_wavelength = min(len(light) * 2 * entries**2, ROWS_VALUES) * 40
