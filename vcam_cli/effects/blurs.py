@@ -177,6 +177,26 @@ class Blur(Effect):
         """
         return None
 
+    def spectral_otf_along(
+        self, frequency: Array, across: tuple[float, float], wavelengths: Array
+    ) -> Array | None:
+        """Return the transfer of `otf_along` at every wavelength.
+
+        Parameters
+        ----------
+        frequency, across
+            As those of `otf_along`.
+        wavelengths : Array
+            Wavelengths (J,) [m].
+
+        Returns
+        -------
+        Array or None
+            Transfer (J, n), or None where it is not known by itself.
+        """
+        rows = [self.otf_along(frequency, across, float(w)) for w in wavelengths]
+        return None if any(row is None for row in rows) else np.array(rows)
+
     def row_transfer(self, frequency: Array, wavelength: float) -> Array:
         """Return the contrast (n,) that it leaves of waves along a row."""
         contrast: Array = np.abs(self.otf_plane(frequency, np.zeros(1), wavelength)[0])
@@ -242,6 +262,12 @@ class RadialTransfer(Blur):
     def otf_along(self, frequency: Array, across: tuple[float, float], wavelength: float) -> Array:
         """Return the transfer (n,) of waves in one direction, which is that of all."""
         return self.otf(np.abs(frequency), wavelength)
+
+    def spectral_otf_along(
+        self, frequency: Array, across: tuple[float, float], wavelengths: Array
+    ) -> Array:
+        """Return the transfer (J, n) at every wavelength (J,) [m], which is that of all."""
+        return self.spectral_otf(np.abs(frequency), wavelengths)
 
 
 @lru_cache(maxsize=64)

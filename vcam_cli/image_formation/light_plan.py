@@ -16,6 +16,7 @@ from itertools import combinations
 
 import numpy as np
 
+from vcam_cli.arrays import Array
 from vcam_cli.effects.base import Effect, SignalLevels, of_kind
 from vcam_cli.effects.blurs import Blur, FieldTransfer, SeparableTransfer
 from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
@@ -159,8 +160,7 @@ def _blur_shares(cost: LightCost, budget: float) -> dict[Effect, float]:
     spreads = {e: e.spread(transfer.wavelengths) for e in of_kind(path.effects, *BLURS)}
     losses = {
         e: BlurLoss(
-            transfer.weights,
-            spread,
+            *_spread_light(transfer.weights, spread),
             e.largest_loss,
             e.is_even,
             e.is_uniform,
@@ -182,6 +182,13 @@ def _blur_shares(cost: LightCost, budget: float) -> dict[Effect, float]:
     # Points in place of averages alias what detail there is: only of even light is that nothing.
     detailed = [e for e in of_kind(shares, PixelAperture) if shares[e] > 0]
     return shares | dict.fromkeys(detailed, math.inf)
+
+
+def _spread_light(weights: Array, spread: Array) -> tuple[Array, Array]:
+    """Return weights (K, C, J) and spreads (J,), of one wavelength where all spread alike."""
+    if spread.min() < spread.max():
+        return weights, spread
+    return weights.sum(axis=2, keepdims=True), spread[:1]
 
 
 def _share(path: OpticalPath, scene: AnyScene, effect: Effect) -> float:

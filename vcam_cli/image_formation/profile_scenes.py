@@ -96,10 +96,10 @@ def _otfs(path: OpticalPath, across: tuple[float, float]) -> dict[Effect, Array]
     frequency = np.linspace(0, path.transfer.cutoff, count)
     found: dict[Effect, Array] = {}
     for blur in of_kind(path.effects, Blur):
-        rows = [blur.otf_along(frequency, across, float(w)) for w in path.transfer.wavelengths]
-        if any(row is None for row in rows):
+        transfer = blur.spectral_otf_along(frequency, across, path.transfer.wavelengths)
+        if transfer is None:
             return None
-        found[blur] = np.array(rows)
+        found[blur] = transfer
     for effect in path.separable:
         along_x, along_y = (
             effect.along_x(frequency * across[0]),

@@ -13,6 +13,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import ClassVar, Literal, Protocol
 
 import numpy as np
@@ -611,18 +612,24 @@ class ChartScene(SampledScene):
         Its discs are not in them; those that touch the area must lie within it.
         """
         edges = self.chart.edges()
-        if edges is None or not all(disc.lies_within(*self.extent) for disc in self.discs(mix)):
+        if edges is None or not self.has_rectangles:
             return None
         x, y = (edges_within(e, size / 2) for e, size in zip(edges, self.extent, strict=True))
         middle_x, middle_y = ((e[1:] + e[:-1]) / 2 for e in (x, y))
         values = self.chart.even_values(middle_x, middle_y, np.asarray(mix, float))
         return Rectangles(x, y, values)
 
+    @cached_property
+    def has_rectangles(self) -> bool:
+        """Whether it is made of even `rectangles`, and of discs within its area."""
+        discs = self.discs(np.zeros((1, len(self.spectra))))
+        within = all(disc.lies_within(*self.extent) for disc in discs)
+        return within and self.chart.edges() is not None
+
     @property
     def is_painted(self) -> bool:
         """Whether it has no closed form."""
-        chart = self.chart
-        return not chart.separates and self.rectangles(np.zeros((1, len(self.spectra)))) is None
+        return not self.chart.separates and not self.has_rectangles
 
     def change_bounds(
         self, losses: Sequence[BlurLoss], geometry: Geometry, ceiling: float, allowed: float

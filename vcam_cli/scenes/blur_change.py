@@ -141,8 +141,10 @@ def parallel_edges_change(places: Array, heights: Array, lengths: Array, loss: B
         Integrals (C, J) for each wavelength by itself [(e/s)^2 m^2].
     """
     steps = np.tensordot(loss.weights, heights, axes=(0, 0))  # (C, J, r, n)
-    between = np.subtract.outer(places, places)
-    both = edge_energy(between, loss.spread, loss.most, loss.aperture)
+    i, j = np.triu_indices(len(places))
+    both = np.empty((len(loss.spread), len(places), len(places)))
+    energy = edge_energy(places[j] - places[i], loss.spread, loss.most, loss.aperture)
+    both[:, i, j] = both[:, j, i] = energy
     pairs = np.einsum("cjrm,jmn,cjrn->cjr", steps, both, steps, optimize=True)
     changes: Array = np.maximum(pairs, 0.0) @ lengths
     return changes

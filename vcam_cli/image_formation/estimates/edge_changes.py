@@ -24,6 +24,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import pixel_centers
 from vcam_cli.effects.blurs import Blur
 from vcam_cli.image_formation.optical_path import OpticalPath
+from vcam_cli.parallel import product
 from vcam_cli.scenes.base import ChartScene, Scene
 from vcam_cli.scenes.charts.slanted_edge import half_plane_cover
 
@@ -73,8 +74,7 @@ def has_straight_edges(scene: Scene) -> TypeGuard[ChartScene]:
         return False
     if scene.chart.profile() is not None:
         return True
-    none = np.zeros((1, len(scene.spectra)))
-    return scene.rectangles(none) is not None and not scene.discs(none)
+    return scene.has_rectangles and not scene.discs(np.zeros((1, len(scene.spectra))))
 
 
 def exact_changes(path: OpticalPath, scene: ChartScene, blurs: Sequence[Blur]) -> dict[Blur, float]:
@@ -183,16 +183,17 @@ def _group_squares(path: OpticalPath, group: EdgeGroup, blur: Blur) -> Array | N
     reach = float(np.abs(group.distances[np.isfinite(group.distances)]).max(initial=0.0))
     if not reach:
         return np.zeros(weights.shape[1])
-    top = END / min(g.pitch_x, g.pitch_y)
+    passed = path.transfer.with_effects((blur,)).cutoff
+    top = min(END / min(g.pitch_x, g.pitch_y), passed)  # beyond, H is 0
     count = math.ceil(4 * reach * top) + 1
     f = (np.arange(count) + 0.5) * (top / count)
     widths = np.abs([g.collecting_width, g.collecting_height]) * np.abs(group.across)
     aperture = np.sinc(f * widths[0]) * np.sinc(f * widths[1])
-    otf = [blur.otf_along(f, group.across, float(w)) for w in path.transfer.wavelengths]
-    if any(row is None for row in otf):
+    wavelengths = path.transfer.wavelengths
+    otf = blur.spectral_otf_along(np.append(f, top), group.across, wavelengths)
+    if otf is None:
         return None
-    transfer = np.array(otf)
-    left = np.real(transfer[:, -1:])
+    transfer, left = otf[:, :-1], np.real(otf[:, -1:])
     distance = np.where(np.isfinite(group.distances), group.distances, 0.0)
     mix = np.eye(weights.shape[2])
     if len(weights) == 1:  # of one component all wavelengths are seen together
@@ -204,22 +205,28 @@ def _group_squares(path: OpticalPath, group: EdgeGroup, blur: Blur) -> Array | N
     taken[:, ~np.isfinite(group.distances)] = 0
     steps = np.tensordot(weights, group.heights, axes=(0, 0))  # (C, J, strips, n)
     change = np.einsum("cjsn,jnm->csnm", steps, taken, optimize=True)
-    size = int(group.pixels.max()) + 1
+    size, strips = int(group.pixels.max()) + 1, change.shape[1]
+    place = (size * np.arange(strips)[:, None] + group.pixels.ravel()).ravel()
     squares = np.zeros(len(change))
-    for color, strips in enumerate(change):
-        for strip, count in zip(strips, group.counts, strict=True):
-            at_pixels = np.bincount(group.pixels.ravel(), strip.ravel(), size)
-            squares[color] += count * float(np.square(at_pixels).sum())
+    for color, parts_of_pixels in enumerate(change):
+        at_pixels = np.bincount(place, parts_of_pixels.ravel(), strips * size)
+        squares[color] = np.square(at_pixels).reshape(strips, size).sum(axis=1) @ group.counts
     return squares
 
 
 def _waves(parts: Array, f: Array, places: Array) -> Array:
     """Return the integrals (J, n) of Im[parts exp(2 pi i f u)] over f at places u (n,) [m].
 
-    `parts` are (J, k) at the midpoints f of k equal steps. A transform gives the integrals at
-    places close together, straight lines between them all others.
+    `parts` are (J, k) at the midpoints f of k equal steps. At few places they are sums. At more, a
+    transform gives them at places close together, straight lines between those all others.
     """
     step, count = 2 * f[0], scipy.fft.next_fast_len(FINER * len(f))
+    if len(places) < count:
+        angle = 2 * np.pi * np.multiply.outer(f, places)
+        sines = product(np.ascontiguousarray(parts.real), np.sin(angle))
+        if np.isrealobj(parts):
+            return step * sines
+        return step * (sines + product(np.ascontiguousarray(parts.imag), np.cos(angle)))
     number = np.arange(count) - count // 2
     spectrum = np.zeros((len(parts), count), complex)
     spectrum[:, : len(f)] = parts * step
