@@ -220,8 +220,8 @@ PARTS = {
         scene_matrix.figures,
     ),
     "times": Part(
-        "the same: time as planned, and with everything on",
-        (*BEFORE_SCENES, *itertools.product(scene_matrix.CAMERAS, scene_matrix.EMPTY)),
+        "the same and `everything`: seconds as planned, and with everything on",
+        tuple(itertools.product(scene_matrix.TIMED, scene_matrix.SCENES | scene_matrix.EMPTY)),
         scene_matrix.times,
         scene_matrix.time_figures,
     ),
