@@ -376,3 +376,20 @@ def test_contradictions_are_told_all_at_once(tmp_path):
 
 def test_a_camera_that_is_right_is_not_refused(tmp_path):
     assert load(camera(tmp_path).origin).name == tree({})["name"]
+
+
+def test_the_geometry_of_the_camera_before_is_kept():
+    made = load("starter")
+    first = geometry(made)
+    assert geometry(made.model_copy()) is first
+    assert geometry(load("starter", ["pixel.width=9 um"])) != first
+    assert geometry(made) == first
+
+
+def test_the_geometry_of_a_lens_in_a_file_is_solved_anew(tmp_path):
+    """The file may have changed."""
+    table = tmp_path / "distortion.csv"
+    table.write_text("image_height_mm,distortion_percent\n0,0\n1,1\n")
+    made = load("starter", [f"optics.distortion={{file: {table}}}"])
+    assert geometry(made) == geometry(made)
+    assert geometry(made) is not geometry(made)

@@ -7,7 +7,11 @@ from sweeping import written
 from vcam_cli import sweep
 from vcam_cli.simulation.simulate import prepare, simulate
 from vcam_cli.sweeps import point_work, sweep_file, sweep_points
-from vcam_cli.sweeps.point_effects import effect_differences, with_every_effect
+from vcam_cli.sweeps.point_effects import (
+    effect_differences,
+    with_every_effect,
+    with_named_effects,
+)
 
 NOISE = "pixel.readout.read_noise"
 CAMERA = {
@@ -55,7 +59,9 @@ def test_all_points_simulate_what_any_of_them_calls_for(tmp_path, monkeypatch):
 def test_what_a_file_switches_off_stays_off(tmp_path):
     _, found = points(tmp_path, {"effects": {"stray_light": "off"}})
     for point in found:
-        assert "stray_light" not in planned(with_every_effect(point.camera))
+        every = with_every_effect(point.camera)
+        assert "stray_light" not in planned(every)
+        assert with_named_effects(point.camera, point.effects).effects == every.effects
 
 
 def test_points_with_the_same_effects_say_nothing(tmp_path):

@@ -23,7 +23,7 @@ from vcam_cli.sweeps import (
     sweep_tables,
 )
 from vcam_cli.sweeps.execution import Execution
-from vcam_cli.sweeps.point_effects import effect_differences
+from vcam_cli.sweeps.point_effects import effect_differences, with_named_effects
 from vcam_cli.sweeps.point_execution import (
     claim_point,
     compute,
@@ -188,7 +188,8 @@ class _Jobs(Sequence[Job]):
         camera = point.camera
         assert camera is not None
         asked = self.metrics, self.keep, self.versions, self.device
-        return Job(point.id, _without_texts(camera), *asked)
+        every = with_named_effects(camera, point.effects)
+        return Job(point.id, _without_texts(every), *asked)
 
 
 def _changes(former: Any, versions: dict[str, str]) -> str:

@@ -11,7 +11,7 @@ for each light takes 16 to 68 % of the time of the points, and points with plans
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from vcam_cli.accuracy_study.ablation import with_effects
 from vcam_cli.camera.camera import Camera
@@ -22,6 +22,14 @@ from vcam_cli.sweeps.sweep_points import Point
 def with_every_effect(camera: Camera) -> Camera:
     """Return the camera with all effects on but those that its file switches off."""
     return with_effects(camera, "all")
+
+
+def with_named_effects(camera: Camera, names: Sequence[str]) -> Camera:
+    """Return the same where the names of these effects are known, which takes no time."""
+    own = camera.effects if isinstance(camera.effects, dict) else {}
+    off = {name for name, wish in own.items() if wish == "off"}
+    states = {name: "off" if name in off else "on" for name in sorted(off.union(names))}
+    return camera.model_copy(update={"effects": states})
 
 
 def effect_differences(points: Iterable[Point]) -> str:

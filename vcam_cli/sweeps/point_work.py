@@ -19,7 +19,6 @@ from vcam_cli.simulation.output import outputs
 from vcam_cli.simulation.output.provenance import versions
 from vcam_cli.simulation.shared import Shared
 from vcam_cli.simulation.simulate import Result, simulate
-from vcam_cli.sweeps.point_effects import with_every_effect
 from vcam_cli.sweeps.sweep_result import FRAMES, Outcome, error_cell
 
 
@@ -44,7 +43,7 @@ class Job:
 
     id: str
     camera: Camera
-    """The camera without its origin, which only messages need."""
+    """The camera, with the effects that it simulates and without its origin, for messages alone."""
     metrics: tuple[str, ...]
     """The names of the metrics that are wanted."""
     keep: tuple[str, ...]
@@ -56,7 +55,7 @@ class Job:
 
     def compute(self, threads: int, shared: Shared) -> tuple[dict[str, float], dict[str, bytes]]:
         """Return the metrics of the point, and the files that are kept of it."""
-        camera = with_every_effect(self.camera)
+        camera = self.camera
         if "render" not in self.keep:
             output = camera.output.model_copy(update={"render": None})
             camera = camera.model_copy(update={"output": output})

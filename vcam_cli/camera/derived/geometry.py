@@ -8,6 +8,7 @@ picture (the lens's inversion is undone).
 from __future__ import annotations
 
 import math
+import operator
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,7 @@ from vcam_cli.camera.derived.pixel_layout import (
     sampling_scale,
 )
 from vcam_cli.camera.derived.traced import traced_view
+from vcam_cli.camera.lens_distortion import DistortionFile
 from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.scene.scene import Extent
 from vcam_cli.errors import Collector, bad
@@ -234,6 +236,22 @@ def geometry(camera: CameraModel) -> Geometry:
     that disagree, a photodetector that leaves its pixel, a microlens that loses light, an exit
     pupil within the stack, a die smaller than a pixel.
     """
+    optics = camera.optics
+    if optics.prescription is not None or isinstance(optics.distortion, DistortionFile):
+        return _solved(camera)  # by files, which may have changed
+    sections = camera.array, optics, camera.pixel, camera.scene
+    known = _LAST.get("geometry")
+    if known is None or not all(map(operator.is_, sections, known[0])):
+        known = _LAST["geometry"] = sections, _solved(camera)
+    return known[1]
+
+
+_LAST: dict[str, tuple[tuple[object, ...], Geometry]] = {}
+"""The last geometry, and the sections that it was solved from: a frame asks for it 15 times."""
+
+
+def _solved(camera: CameraModel) -> Geometry:
+    """Return the solved geometry of a camera."""
     problems = Collector()
     optics = problems.attempt(lens, camera)
     areas = problems.attempt(_areas, camera)
