@@ -38,8 +38,6 @@ ZOOM = 7
 ROUNDS = 4
 """Times that are tried for a capture: SCAN over the whole range, then ZOOM around the best, in
 ROUNDS rounds in all."""
-KINKS = 32
-"""About as many kinks are tried too."""
 PIECES = 128
 """Segments or levels of the pdf that is searched; the result is judged by the whole pdf."""
 
@@ -203,9 +201,8 @@ class _CoordinateAscent:
     def _scan_times(self, times: Floats) -> Floats:
         """Return times over the whole range, kinks, the captures' and those a gap from them."""
         spread = np.geomspace(self.first, self.longest, SCAN)
-        step = max(1, len(self.kinks) // KINKS)
         beside = [times - self.interval, times, times + self.interval]
-        tries = np.unique(np.concatenate([spread, self.kinks[::step], *beside]))
+        tries = np.unique(np.concatenate([spread, self.kinks, *beside]))
         return np.asarray(tries[(tries >= self.first) & (tries <= self.longest)])
 
 
