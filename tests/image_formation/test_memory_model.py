@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 
@@ -240,6 +241,23 @@ def test_more_pixels_need_more():
         for n in (1000, 2000)
     )
     assert few < many
+
+
+@pytest.mark.parametrize(("name", "colors"), [("colorchecker-d65", 3), ("slanted-edge-f8", 1)])
+def test_a_comparison_with_the_ideal_image_takes_what_is_estimated(name, colors):
+    """What Python allocates for it, after the frame has been taken."""
+    rows, columns = 192, 256
+    sets = [f"array.rows={rows}", f"array.columns={columns}", "quality=[psnr]"]
+    found = simulate(load(name, sets), workers=1)
+    tracemalloc.start()
+    assert found.metrics["psnr_db"] > 0
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    g = found.frame.geometry
+    with_it, without = (
+        memory_model.frame_bytes(g, STANDARD, colors, judged, 1) for judged in (True, False)
+    )
+    assert peak <= (with_it - without) / memory_model.SLACK <= 1.1 * peak
 
 
 @pytest.mark.parametrize("samples", [0, 8])
