@@ -282,3 +282,15 @@ def test_mixtures_serve_every_place_of_a_field():
     limited, worse = mixtures(one, TableSize(3e5, 2049, 1e-9, 8, rank=2), more)
     assert len(limited) == 2
     assert worse > error
+
+
+def test_mixtures_err_as_stated_between_the_frequencies_at_which_they_are_judged():
+    """Behind a defocus of many waves, whose contrast turns often."""
+    strong = SymmetricBlur(Lens(2.8, True), ((4, 2e-6),))
+    exact = spectral(Diffraction(2.8, 0.0), strong, components=31)
+    size = TableSize(4e5, 2049, 2e-3, 8)
+    mix, error = mixtures(exact, size)
+    f = np.linspace(0, size.top, 4001)
+    rebuilt = np.tensordot(mix.T, exact.with_mixtures(mix).radial_response(f), axes=1)
+    lost = np.abs(rebuilt - exact.radial_response(f)).max() / exact.level.max()
+    assert error <= lost * (1 + 1e-9) <= 1.02 * error

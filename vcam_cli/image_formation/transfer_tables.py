@@ -36,7 +36,9 @@ axis: 268 MB. With 513 a blur over six pixels erred by 0.1 % at a tolerance of 0
 ROWS_VALUES = 1 << 22
 """Transfers by wavelength that are computed at once for such a table, about: 64 MB."""
 JUDGED = 256
-"""Frequencies at which mixtures of spectra are judged: transfer functions are smooth."""
+"""Frequencies at which mixtures of spectra are judged. Between them they err by 1.003 times what is
+stated at most, behind a defocus of 2 um, whose contrast turns most often; with half as many by
+1.055. More cost time alone."""
 
 
 @dataclass(frozen=True)
