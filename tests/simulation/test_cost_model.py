@@ -3,6 +3,7 @@
 import pytest
 from making import GONE, camera
 
+from vcam_cli.effects.noise.fpn import DRAW
 from vcam_cli.simulation import cost_model
 from vcam_cli.simulation.simulate import prepare
 from vcam_cli.solve.solved import solve
@@ -41,3 +42,23 @@ def test_charge_of_joined_pixels_is_drawn_and_coded_once(kind, joined, tmp_path)
     each, together = seconds
     for name in ("shot_noise", "read_noise", "quantization"):
         assert together[name] == pytest.approx(each[name] / joined)
+
+
+def test_draws_of_a_pattern_that_are_skipped_are_seconds_saved(tmp_path):
+    """Offsets of 1e-3 electrons beside gains of 1 %: their draw is left out, and foretold."""
+    pattern = {"pixel.fpn": {"offset_pixel": "0.001 e", "gain_pixel": "1 %"}}
+    planned = {}
+    for effects in ("auto", "all"):
+        changes = MOSAIC | pattern | {"effects": effects}
+        planned[effects] = prepare(camera(tmp_path, changes), 1)[0]
+    fpn = {
+        effects: next(d for d in ready.plan.decisions if d.name == "fpn")
+        for effects, ready in planned.items()
+    }
+    pixels = planned["all"].geometry.rows * planned["all"].geometry.columns
+    assert "skipped parts: offset_pixel" in fpn["auto"].reason
+    assert fpn["auto"].saved == pytest.approx(DRAW * pixels)
+    assert fpn["auto"].seconds + fpn["auto"].saved == pytest.approx(fpn["all"].seconds)
+    plan = planned["auto"].plan
+    slow = cost_model.slowness() / cost_model.threads(1)
+    assert plan.seconds_of_all - plan.seconds >= 0.99 * slow * DRAW * pixels

@@ -129,7 +129,8 @@ class Effect(ABC):
     absent: ClassVar[str]
     """Why a camera does not have it: a sentence."""
     seconds_per_pixel: ClassVar[float] = 0.0
-    """Cost on one core of 2020s hardware, for the plan's estimate."""
+    """Time of one pixel with all that the effect may have [core seconds]; that of effects on
+    electrons as scripts/effect_seconds.py measures it."""
     acts_on_light: ClassVar[bool] = True
     """Whether the mean light on the lattice may depend on whether it runs."""
     keys_behind_light: ClassVar[tuple[str, ...]] = ()
@@ -213,6 +214,11 @@ class Effect(ABC):
     """Bound on |1 - H(f)|: 1 where its transfer is never negative."""
     is_even: ClassVar[bool] = False
     """Whether its blur is symmetric along x and along y."""
+
+    @property
+    def pixel_seconds(self) -> float:
+        """Time of one pixel with what this camera's numbers call for [core seconds]."""
+        return self.seconds_per_pixel
 
     @property
     def is_uniform(self) -> bool:

@@ -79,7 +79,7 @@ def device_cost(ready: Prepared, workers: int) -> DeviceCost:
     pixels, colors = lattice.rows * lattice.columns, len(ready.layout.mosaic.colors)
     work = filter_work(lattice, colors, ready.spectrum)
     acting: tuple[ElectronEffect | Quantizer, ...] = of_kind(plan.active, ElectronEffect, Quantizer)
-    moved = work.seconds + pixels * sum(effect.seconds_per_pixel for effect in acting)
+    moved = work.seconds + pixels * sum(effect.pixel_seconds for effect in acting)
     # Samples go there and light comes back; light goes there again, electrons and codes come back.
     copied = REAL * (work.samples + work.values) + PLACE * work.looks
     copied += pixels * (2 * REAL + CODE)

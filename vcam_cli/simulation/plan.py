@@ -69,7 +69,7 @@ class Decision:
     seconds: float
     """Time that it takes on one core [s]."""
     saved: float = 0.0
-    """Time that leaving it out saves on one core [s]."""
+    """Time that leaving it out, or its parts that are skipped, saves on one core [s]."""
     free: bool = False
     """Whether it could be left out, but would save nothing."""
 
@@ -138,7 +138,8 @@ def make(
     omitted = {*light.omitted, *_negligible(effects, variances, light, shares)}
     on = tuple(effect for effect in present if effect not in omitted)
     active, idle = _without_idle_draws(effects, on, variances)
-    weigh = _Weighing(present, signal, shares, pixels, idle, tolerance)
+    running = {effect.name: effect for effect in active}
+    weigh = _Weighing(present, signal, shares, pixels, running, idle, tolerance)
     decisions = [_decide(kind, effects, light, omitted, weigh) for kind in ORDER]
     seconds = sum(decision.seconds for decision in decisions)
     return Plan(tuple(decisions), active, settings, seconds, memory_bytes, levels=signal.levels)
@@ -184,7 +185,7 @@ def _negligible(
 
     def worth(effects: tuple[Effect, ...]) -> tuple[float, int, float]:
         return (
-            sum(e.seconds_per_pixel for e in effects),
+            sum(e.pixel_seconds for e in effects),
             len(effects),
             -sum(uses[e] for e in effects),
         )
@@ -285,6 +286,8 @@ class _Weighing:
     signal: SignalLevels
     shares: Mapping[str, float]
     pixels: int
+    active: Mapping[str, Effect]
+    """Name -> effect that runs, less those draws."""
     idle: Mapping[str, tuple[str, ...]]
     """Name of an effect -> its draws that are not called for."""
     tolerance: float
@@ -320,7 +323,7 @@ def _decide(
     allowed = None if contribution is None else part * weigh.tolerance
     weighed = contribution, allowed, unit
     wish, what = effects.wish(effect), effect.describe()
-    seconds = kind.seconds_per_pixel * weigh.places(kind)
+    seconds = effect.pixel_seconds * weigh.places(kind)
     if wish == "off":
         return Decision(kind.name, "off", "user", "switched off in effects", *weighed, 0.0)
     if effect in omitted:
@@ -335,5 +338,6 @@ def _decide(
         what += "; free: could be skipped, which would save no time"
     if idle := weigh.idle.get(kind.name):
         what += f"; skipped parts: {', '.join(idle)}"
+    kept = weigh.active[kind.name].pixel_seconds * weigh.places(kind)
     by = "user" if wish == "on" else "plan"
-    return Decision(kind.name, "on", by, what, *weighed, seconds, free=free)
+    return Decision(kind.name, "on", by, what, *weighed, kept, seconds - kept, free)

@@ -40,9 +40,9 @@ class MergedNoise(NoiseSource):
         return self._any.reference
 
     @property
-    def seconds_per_pixel(self) -> float:  # type: ignore[override]
+    def pixel_seconds(self) -> float:
         """Time of all readouts [s]."""
-        return sum(0.0 if s is None else s.seconds_per_pixel for s in self.sources)
+        return sum(0.0 if s is None else s.pixel_seconds for s in self.sources)
 
     @property
     def scope(self) -> str:  # type: ignore[override]

@@ -33,7 +33,7 @@ class AdcNoise(NoiseSource):
     reference = "EMVA Standard 1288, release 4.0, section 2.2: noise behind the gain"
     keys_behind_light = ("adc.noise",)
     absent = "adc.noise is 0"
-    seconds_per_pixel = 9e-9
+    seconds_per_pixel = 8e-9
     origin = "readout"
     behind_well = True
 

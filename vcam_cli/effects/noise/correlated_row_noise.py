@@ -37,7 +37,7 @@ class CorrelatedRowNoise(NoiseSource):
     reference = "EMVA 1288 release 4.0, section 8 (row noise); Box and Jenkins 1976, section 3.2.3"
     keys_behind_light = ("pixel.readout.correlated_row_noise",)
     absent = "pixel.readout.correlated_row_noise has the value none or 0"
-    seconds_per_pixel = 1e-9
+    seconds_per_pixel = 1.7e-9
     origin = "readout"
 
     @classmethod

@@ -25,6 +25,8 @@ from vcam_cli.errors import bad
 
 OVERFULL = 100
 """Full wells of charge in a hot pixel: more than the noise of any readout brings below one."""
+DRAW, DEFECTS = 8e-9, 7e-9
+"""Time of one pixel for each part that is drawn, and for defects [core seconds]."""
 
 
 @dataclass(frozen=True)
@@ -63,10 +65,16 @@ class FixedPattern(NoiseSource):
     reference = "Chen 2003, eq 2.26 (Q_f); El Gamal et al., Proc. SPIE 3301, 1998"
     keys_behind_light = ("pixel.fpn", "pixel.defects")
     absent = "pixel.fpn and pixel.defects have nothing that the architecture has"
-    seconds_per_pixel = 20e-9
+    seconds_per_pixel = 3 * DRAW + DEFECTS
     scope = "sensor"
     sample_draws = "common"
     parts = ("offset_pixel", "gain_pixel", "dark")
+
+    @property
+    def pixel_seconds(self) -> float:
+        """Time of one pixel with what this camera's numbers call for [core seconds]."""
+        drawn = sum(getattr(self, part) > 0 for part in self.parts)
+        return DRAW * drawn + DEFECTS * (self.hot > 0 or self.dead > 0)
 
     def __post_init__(self) -> None:
         # Where all pixels are defective they do not differ: the plan would see no noise in it.

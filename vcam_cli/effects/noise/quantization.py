@@ -33,7 +33,7 @@ class Quantization(Quantizer):
     reference = "Chen 2003, section 2.3.4"
     keys_behind_light = ("adc",)
     absent = "every camera has it"
-    seconds_per_pixel = 2e-9
+    seconds_per_pixel = 0.75e-9
 
     @classmethod
     def from_camera(cls, camera: Camera, geometry: Geometry) -> Quantizer:

@@ -39,7 +39,7 @@ class ReadNoise(NoiseSource):
         "pixel.readout.row_noise",
     )
     absent = "pixel.readout has no read, column or row noise that its architecture has"
-    seconds_per_pixel = 9e-9
+    seconds_per_pixel = 8e-9
     origin = "readout"
 
     @classmethod

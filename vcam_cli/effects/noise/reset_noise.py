@@ -36,7 +36,7 @@ class ResetNoise(NoiseSource):
         "pixel.readout.reset_noise has the value none or 0, or correlated double sampling"
         " removes it (aps-4t, ccd)"
     )
-    seconds_per_pixel = 9e-9
+    seconds_per_pixel = 8e-9
     sample_draws = "common"
 
     @classmethod

@@ -255,7 +255,7 @@ class LightCost:
             Time [core seconds].
         """
         pixels = self.path.geometry.rows * self.path.geometry.columns
-        gains = sum(effect.seconds_per_pixel for effect in omitted) * pixels
+        gains = sum(effect.pixel_seconds for effect in omitted) * pixels
         kinds = Blur, SeparableTransfer, FieldTransfer, Warp
         if not of_kind(omitted, *kinds):  # the image is the same, whatever it takes
             return gains
