@@ -626,6 +626,11 @@ class ChartScene(SampledScene):
         within = all(disc.lies_within(*self.extent) for disc in discs)
         return within and self.chart.edges() is not None
 
+    @cached_property
+    def component_rectangles(self) -> Rectangles | None:
+        """Its `rectangles` in each component by itself."""
+        return self.rectangles(np.eye(len(self.spectra)))
+
     @property
     def is_painted(self) -> bool:
         """Whether it has no closed form."""
@@ -639,7 +644,7 @@ class ChartScene(SampledScene):
         profile = self.chart.profile()
         if profile is not None:
             return profile_bounds(profile, losses, geometry, ceiling)
-        found = self.rectangles(np.eye(components))
+        found = self.component_rectangles
         if found is None or self.discs(np.eye(components)):
             return super().change_bounds(losses, geometry, ceiling, allowed)
         return rectangle_bounds(found.x, found.y, found.values, losses, geometry, ceiling)

@@ -145,7 +145,7 @@ def parallel_edges_change(places: Array, heights: Array, lengths: Array, loss: B
     both = np.empty((len(loss.spread), len(places), len(places)))
     energy = edge_energy(places[j] - places[i], loss.spread, loss.most, loss.aperture)
     both[:, i, j] = both[:, j, i] = energy
-    pairs = np.einsum("cjrm,jmn,cjrn->cjr", steps, both, steps, optimize=True)
+    pairs = np.sum(np.matmul(steps, both) * steps, axis=-1)
     changes: Array = np.maximum(pairs, 0.0) @ lengths
     return changes
 

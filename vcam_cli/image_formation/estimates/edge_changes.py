@@ -121,7 +121,7 @@ def _groups(path: OpticalPath, scene: ChartScene, spread: float) -> Iterator[Edg
         heights = np.diff(profile.levels)[None, None]
         yield _along_profile(path, profile.across, profile.places, heights, spread)
         return
-    rectangles = scene.rectangles(np.eye(len(scene.spectra)))
+    rectangles = scene.component_rectangles
     assert rectangles is not None
     for axis, (edges, others, at, lines) in enumerate(
         ((rectangles.x, rectangles.y, x, y), (rectangles.y, rectangles.x, y, x))
@@ -204,7 +204,10 @@ def _group_squares(path: OpticalPath, group: EdgeGroup, blur: Blur) -> Array | N
     taken = np.multiply.outer(mix @ (1 - left[:, 0]), box) - waves  # (J, n, m)
     taken[:, ~np.isfinite(group.distances)] = 0
     steps = np.tensordot(weights, group.heights, axes=(0, 0))  # (C, J, strips, n)
-    change = np.einsum("cjsn,jnm->csnm", steps, taken, optimize=True)
+    # of every edge by itself: (n, C strips, J) by (n, J, m)
+    each = np.ascontiguousarray(steps.transpose(3, 0, 2, 1)).reshape(steps.shape[3], -1, len(taken))
+    change = np.matmul(each, taken.transpose(1, 0, 2)).swapaxes(0, 1)
+    change = change.reshape(len(steps), steps.shape[2], *distance.shape)
     size, strips = int(group.pixels.max()) + 1, change.shape[1]
     place = (size * np.arange(strips)[:, None] + group.pixels.ravel()).ravel()
     squares = np.zeros(len(change))

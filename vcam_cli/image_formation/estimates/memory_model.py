@@ -8,8 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.blurs import PlaneTransfer
@@ -195,7 +193,7 @@ def _samples(path: OpticalPath, scene: SampledScene, highest: float, planes: int
         return planes * rows * x.terms
     if scene.chart.separates:
         return 0  # few functions of one variable
-    found = scene.rectangles(np.zeros((1, len(scene.spectra))))
+    found = scene.component_rectangles
     assert found is not None
     down, along = len(found.y) - 1, len(found.x) - 1
     # Terms of every run along both axes in 64 bits, and along x for each row of rectangles.
