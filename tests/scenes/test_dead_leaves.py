@@ -11,7 +11,7 @@ from vcam_cli.physics.cache import ByteCache
 from vcam_cli.scenes import disc_edges, discs
 from vcam_cli.scenes.base import Frame
 from vcam_cli.scenes.build import build
-from vcam_cli.scenes.cells import cell_edges
+from vcam_cli.scenes.cells import cell_edges, cell_means
 from vcam_cli.scenes.charts import dead_leaves
 from vcam_cli.scenes.discs import Discs
 
@@ -202,6 +202,18 @@ def test_coverage_that_is_kept_paints_the_same_bytes_in_any_colors(monkeypatch):
     assert kept.averages(shifted, edges, mixes[0]).tobytes() != alone[0].tobytes()
     many = cell_edges(dead_leaves.KEPT_CELLS // 1000 + 1, 1e-4), cell_edges(1000, 1e-4)
     assert not chart.crop_to_cells(*many).keep
+
+
+def test_coverage_of_larger_cells_is_the_mean_of_their_parts():
+    edges = cell_edges(90, 0.0009)
+    laid = dead_leaves.DeadLeaves(3, 1.0, keep=False).crop_to_cells(edges, edges)
+    fine = discs.coverage(laid.leaves.discs, edges, edges, None, 2)
+    colors = laid.leaves.color(np.random.default_rng(1).uniform(-0.1, 1, (2, 12)))
+    parts, cells = np.empty((2, 90, 90)), np.empty((2, 30, 30))
+    fine.paint(colors, parts)
+    fine.together(3).paint(colors, cells)
+    np.testing.assert_allclose(cells, cell_means(parts, 3), atol=1e-12)
+    assert fine.together(3).nbytes < fine.nbytes
 
 
 def test_coverage_is_bounded(monkeypatch):

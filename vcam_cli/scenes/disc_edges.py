@@ -7,6 +7,7 @@ cells are divided is chosen by it (`divisions`).
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -128,6 +129,13 @@ class EdgeShares:
         """Memory [bytes]."""
         return sum(getattr(self, field.name).nbytes for field in fields(self))
 
+    def seen(self) -> Iterator[tuple[Array, Array, Array]]:
+        """Yield cells, labels that are seen in them and the parts of them that these fill."""
+        single, several = np.flatnonzero(self.single), np.flatnonzero(~self.single)
+        yield single, self.front, self.inside
+        yield single, self.back, 1 - self.inside
+        yield several[self.cell], self.label, self.weight
+
     def colors(self, color: Array) -> Array:
         """Return the average color of every cell.
 
@@ -142,14 +150,15 @@ class EdgeShares:
             Averages (R, m), in the unit of `color`.
         """
         out = np.empty((len(color), len(self.single)))
+        # Numbers are kept in few bits; indexing converts them each time.
+        single, several = np.flatnonzero(self.single), np.flatnonzero(~self.single)
+        front, back, cell, label = (
+            numbers.astype(np.intp) for numbers in (self.front, self.back, self.cell, self.label)
+        )
+        behind = 1 - self.inside
         for plane, row in zip(out, color, strict=True):
-            light = row[self.front] * self.inside + row[self.back] * (1 - self.inside)
-            plane[self.single] = light
-        if len(self.cell):
-            several = ~self.single
-            count = int(several.sum())
-            for plane, row in zip(out, color, strict=True):
-                plane[several] = np.bincount(self.cell, row[self.label] * self.weight, count)
+            plane[single] = row.take(front) * self.inside + row.take(back) * behind
+            plane[several] = np.bincount(cell, row.take(label) * self.weight, len(several))
         return out
 
 
@@ -190,6 +199,36 @@ def edge_shares(discs: Discs, cells: CrossedCells, divided: int = MOST) -> EdgeS
     labels, cells_type = (np.min_scalar_type(count + 1) for count in (len(discs), len(single)))
     front, back, label = (numbers.astype(labels) for numbers in (front, back, label))
     return EdgeShares(single, front, back, inside, cell.astype(cells_type), label, weight)
+
+
+def several_shares(count: int, cell: Array, label: Array, weight: Array) -> EdgeShares | None:
+    """Return the visible discs in cells with several edges each.
+
+    Parameters
+    ----------
+    count : int
+        Number of cells.
+    cell, label, weight : Array
+        Cells (n,), labels that are seen in them, which may stand there several times, and parts of
+        them that these fill, in any unit.
+
+    Returns
+    -------
+    EdgeShares or None
+        Labels and parts; None of no cells.
+    """
+    if not count:
+        return None
+    labels = int(label.max()) + 1
+    key = cell.astype(np.int64) * labels + label
+    order = np.argsort(key, kind="stable")
+    starts = np.flatnonzero(np.diff(key[order], prepend=-1))
+    weight, key = np.add.reduceat(weight[order], starts), key[order[starts]]
+    cell, seen = np.divmod(key, labels)
+    weight /= np.bincount(cell, weight, count)[cell]
+    none = np.empty(0, label.dtype)
+    cell, seen = cell.astype(np.min_scalar_type(count)), seen.astype(label.dtype)
+    return EdgeShares(np.zeros(count, bool), none, none, np.empty(0), cell, seen, weight)
 
 
 @dataclass(frozen=True)

@@ -62,6 +62,7 @@ class MaskedChart(Chart):
         if not len(across) or not len(down):
             return
         x, y, even = x_inside, y_inside, self.opacity.is_even
+        lit = np.flatnonzero(mix[:, :-1].any(axis=1))  # opacity alone has no light to paint
         if not even:
             borders = self.opacity.sample_borders(x, y)
             x, y = (_with_borders(*both) for both in zip((x, y), borders, strict=True))
@@ -69,8 +70,12 @@ class MaskedChart(Chart):
         few = max(1, len(down) * MOST_PARTS // ((len(x) - 1) * (len(y) - 1)))
         for some in pieces(len(down), few):
             here = y[first[some.start] : first[some.stop] + 1]
-            seen = self.light.averages(x, here, mix[:, :-1])
-            seen += mix[:, -1, None, None]
+            seen = np.tile(mix[:, -1, None, None], (1, len(here) - 1, len(x) - 1))
+            if len(lit):
+                for plane, light in zip(
+                    lit, self.light.averages(x, here, mix[lit, :-1]), strict=True
+                ):
+                    seen[plane] += light
             at = slice(1) if even else slice(None)
             between = (here[1:] + here[:-1]) / 2
             seen *= self.opacity.values(middle[at], between[at], np.ones((1, 1), mix.dtype))

@@ -27,7 +27,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.scenes import discs
 from vcam_cli.scenes.base import Chart, Frame
-from vcam_cli.scenes.cells import cell_edges, cell_means
+from vcam_cli.scenes.cells import cell_edges
 from vcam_cli.scenes.disc_edges import MOST, Discs, divisions
 from vcam_cli.scenes.discs import Cells
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, counted_height
@@ -276,8 +276,8 @@ class DeadLeaves(Chart):
         parts = self._parts(x_edges, y_edges)
         cells = (len(x_edges) - 1) * (len(y_edges) - 1) * parts**2
         whole = self if self.keep is not None else replace(self, keep=cells <= KEPT_CELLS)
-        if parts > 1:
-            return whole
+        if parts > 1 or (whole.keep and hidden is None):
+            return whole  # the leaves are found where cells are painted for the first time
         laid = whole._placed_leaves(x_edges, y_edges)
         step = int(2 * SMALLEST * self.unit * (len(x_edges) - 1) / (x_edges[-1] - x_edges[0]))
         if step < 4:
@@ -304,7 +304,7 @@ class DeadLeaves(Chart):
     ) -> None:
         """Write the averages over the cells into `out`; 0 in the cells that are hidden."""
         parts = self._parts(x_edges, y_edges)
-        if parts == 1:
+        if parts == 1 and not (self.keep and hidden is None):
             self._placed_leaves(x_edges, y_edges).paint(x_edges, y_edges, mix, out, hidden)
             return
         far = max(float(edges[-1] - edges[0]) for edges in (x_edges, y_edges)) > PERIOD * self.unit
@@ -350,19 +350,19 @@ class DeadLeaves(Chart):
         for top in range(0, rows, band):
             cells = out[:, top : top + band]
             y = _divided(y_edges[top : top + band + 1], parts)
-            make = partial(each._covered, x, y)
+            make = partial(each._covered, x, y, parts)
             if self.keep:
                 make = partial(
                     discs.painted_once, (x, y), (self.seed, self.unit, each.divided), make
                 )
-            cells[:] = cell_means(make().averages(mix), parts)
+            cells[:] = make().averages(mix)
 
-    def _covered(self, x_edges: Array, y_edges: Array) -> "CoveredCells":
-        """Return which leaves are seen where on undivided cells."""
-        laid = self.crop_to_cells(x_edges, y_edges)
+    def _covered(self, x_edges: Array, y_edges: Array, parts: int) -> "CoveredCells":
+        """Return which leaves are seen where on cells, painted on so many parts of each side."""
+        laid = replace(self, keep=False).crop_to_cells(x_edges, y_edges)
         assert isinstance(laid, PlacedLeaves)
         x, y = x_edges / self.unit, y_edges / self.unit
-        found = discs.coverage(laid.leaves.discs, x, y, None, self.divided)
+        found = discs.coverage(laid.leaves.discs, x, y, None, self.divided).together(parts)
         near = replace(found, near=np.arange(len(found.near)))
         return CoveredCells(laid.leaves.select(found.near), near)
 
