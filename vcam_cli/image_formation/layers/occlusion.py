@@ -187,22 +187,26 @@ def covariance(
     """
     colors, (rows, columns) = len(layers[0].planes) - 1, inner
     dtype = layers[0].planes.dtype
+    lights = [layer.planes[:-1] for layer in layers]
+    clears = [1 - layer.planes[-1] for layer in layers[:-1]]
 
     def summed(rays: Array) -> Sums:
         offsets = [layer.offsets(rays) for layer in layers]
         light = np.zeros((len(layers) + 1, colors, rows, columns), dtype)  # of all, and of each
-        cover = np.zeros((len(layers) - 1, rows, columns), dtype)
+        clear = np.zeros((len(layers) - 1, rows, columns), dtype)
+        seen: Array = np.empty((colors, rows, columns), dtype)
         for number in range(len(rays)):
-            parts = []
-            for layer, own in zip(layers, offsets, strict=True):
-                part = layer.planes[(slice(None), *met(own[number]))]
-                parts.append((part[:-1], part[-1]))
-            light[0] += front_to_back(parts)
-            for sums, (own_light, _) in zip(light[1:], parts, strict=True):
-                sums += own_light
-            for sums, (_, opacity) in zip(cover, parts[:-1], strict=True):
-                sums += opacity
-        return rays, light, cover
+            at = [met(own[number]) for own in offsets]
+            behind = lights[-1][:, *at[-1]]
+            light[-1] += behind
+            for k in range(len(layers) - 2, -1, -1):
+                own, passed = lights[k][:, *at[k]], clears[k][at[k]]
+                behind = np.multiply(behind, passed, out=seen)
+                behind += own
+                light[k + 1] += own
+                clear[k] += passed
+            light[0] += behind
+        return rays, light, len(rays) - clear
 
     (together, *alone), covers = seen(map(summed, groups))
     means = list(zip(alone, [*covers, np.ones_like(together)], strict=True))

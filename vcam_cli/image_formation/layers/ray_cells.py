@@ -210,6 +210,7 @@ class SharpImage:
         blurs = (*lens, *of_kind(behind, Blur))
         self._transfer = Transfer(path.transfer.wavelengths, white, blurs)
         self._known: dict[tuple[int, tuple[int, int]], Array] = {}
+        self._tables: dict[tuple[float, float], tuple[Array, Array]] = {}
 
     @property
     def diffracts(self) -> bool:
@@ -285,53 +286,51 @@ class SharpImage:
         """
         every = iter(groups)
         first, second = next(every), next(every, None)
-        if second is None:
-            images = self._means(cells, first)
+        if second is not None:
+            spectra = self._waves(cells, chain([first, second], every))
+        elif self.is_local:
+            rays, light, cover = first
+            images = (image / len(rays) for image in (light, cover[:, None]))
+            light, cover = (self._collected(cells, image, (-2, -1)) for image in images)
+            return light, np.broadcast_to(cover, (len(cover), *light.shape[1:]))
         else:
-            images = self._waves(cells, chain([first, second], every))
-        light, cover = (self._collected(cells, image) for image in images)
+            spectra = self._means(cells, first)
+        light, cover = (self._on_pixels(cells, spectrum) for spectrum in spectra)
         return light, np.broadcast_to(cover, (len(cover), *light.shape[1:]))
 
     def _means(self, cells: Cells, group: Sums) -> tuple[Array, Array]:
-        """Return images (n, C, h, w) and (m, C or 1, h, w) where every ray counts alike."""
+        """Return spectra (n, C, h, k) and (m, C, h, k) where every ray counts alike."""
         rays, light, cover = group
-        light, cover = light / len(rays), cover[:, None] / len(rays)
-        if self.is_local:
-            return light, cover
-        shape = light.shape[-2:]
-        transfer = self._on(cells, shape)
-        light, cover = (
-            scipy.fft.irfft2(scipy.fft.rfft2(image) * transfer, shape) for image in (light, cover)
-        )
-        return light, cover
+        transfer = self._on(cells) / len(rays)
+        spectrum = scipy.fft.rfft2(light)
+        spectrum *= transfer
+        return spectrum, scipy.fft.rfft2(cover[:, None]) * transfer
 
     def _waves(self, cells: Cells, groups: Iterable[Sums]) -> tuple[Array, Array]:
         """Return the same of several groups: at each frequency of the rays that it passes."""
         light: Array | float = 0.0
         cover: Array | float = 0.0
         passed: Array | float = 0.0
-        shape = (0, 0)
         for rays, own_light, own_cover in groups:
-            shape = own_light.shape[-2:]
-            share = self._passed(cells, shape, rays)
+            share = self._passed(cells, rays)
             passed = passed + len(rays) * share
             light = light + scipy.fft.rfft2(own_light) * share
             cover = cover + scipy.fft.rfft2(own_cover[:, None]) * share
-        transfer = self._on(cells, shape)
+        transfer = self._on(cells)
         # How many pairs of points there are is that of the lens's own transfer, exactly.
         transfer = np.divide(
             transfer, passed, out=np.zeros_like(transfer), where=np.asarray(passed) > 0
         )
-        return scipy.fft.irfft2(light * transfer, shape), scipy.fft.irfft2(cover * transfer, shape)
+        return light * transfer, cover * transfer
 
-    def _passed(self, cells: Cells, shape: tuple[int, int], rays: Array) -> Array:
+    def _passed(self, cells: Cells, rays: Array) -> Array:
         """Return the part (C, h, w) of the light that pairs of points around rays diffract.
 
         Two points of the pupil, 2 s apart in its radii and with the middle u, are both on it where
         s^2 + 2 |u s| <= 1 - u^2; waves of the frequency f come from s = wavelength N f.
         """
         assert self._lens is not None
-        fx, fy = self._frequencies(cells, shape)
+        fx, fy = self._frequencies(cells)
         wavelengths, (weights,) = self._transfer.wavelengths, self._transfer.weights
         number = 1 / (self._lens.cutoff(1.0))  # N, of the light that has a wavelength of 1
         squares = np.square(number * fx)[None, :] + np.square(number * fy)[:, None]
@@ -347,55 +346,87 @@ class SharpImage:
         kind = np.float32 if cells.single else np.float64
         return np.asarray(total / len(_spread(rays[:, :2])), kind)
 
-    def _collected(self, cells: Cells, image: Array) -> Array:
+    def _on_pixels(self, cells: Cells, spectrum: Array) -> Array:
+        """Return the means over the collecting areas of images, of their spectra (..., h, k).
+
+        The spectra have passed `_on`, and so the mean over what a pixel collects along y: pixels
+        are every so many cells apart, which folds the spectrum. Along x it is taken of cells.
+        """
+        n, (rows, columns) = cells.per_pixel, cells.inner
+        folded = spectrum[..., : rows // n, :]
+        for k in range(1, n):
+            folded = folded + spectrum[..., k * rows // n : (k + 1) * rows // n, :]
+        lines = scipy.fft.ifft(folded, axis=-2)[..., : cells.window.pixels[0], :]
+        return self._collected(cells, scipy.fft.irfft(lines, columns), (-1,))
+
+    def _collected(self, cells: Cells, image: Array, axes: Iterable[int]) -> Array:
         """Return the means over the collecting areas of an image, exactly on its even cells."""
         n, start = cells.per_pixel, cells.border
-        for axis, side, pixels in zip(
-            (-2, -1), cells.sides[::-1], cells.window.pixels, strict=True
-        ):
-            half = sum(box[-1 - axis] for box in self._apertures) / side / 2
-            low, high = (min(max(n / 2 + end, 0.0), n) for end in (-half, half))
-            edges = np.arange(n + 1)
-            share = np.minimum(edges[1:], max(high, low + TINY)) - np.maximum(edges[:-1], low)
-            share = np.maximum(share, 0)
+        for axis in axes:
+            pixels, shares = cells.window.pixels[axis], self._shares(cells, axis)
             total: Array | float = 0.0
-            for k in np.flatnonzero(share):
+            for k in np.flatnonzero(shares):
                 part = slice(start + int(k), start + int(k) + n * pixels, n)
                 cut = image[..., part, :] if axis == -2 else image[..., part]
-                total = total + cut * image.dtype.type(share[k] / share.sum())
+                total = total + cut * image.dtype.type(shares[k])
             image = np.asarray(total)
         return image
 
-    def _on(self, cells: Cells, shape: tuple[int, int]) -> Array:
-        """Return the transfer (C, h, w) of all but the photodetectors."""
-        key = cells.per_pixel, shape
+    def _shares(self, cells: Cells, axis: int) -> Array:
+        """Return what part of a pixel's light each of its cells (n,) collects along an axis."""
+        n = cells.per_pixel
+        half = sum(box[-1 - axis] for box in self._apertures) / cells.sides[-1 - axis] / 2
+        low, high = (min(max(n / 2 + end, 0.0), n) for end in (-half, half))
+        edges = np.arange(n + 1)
+        share = np.minimum(edges[1:], max(high, low + TINY)) - np.maximum(edges[:-1], low)
+        share = np.maximum(share, 0)
+        return np.asarray(share / share.sum())
+
+    def _on(self, cells: Cells) -> Array:
+        """Return the transfer (C, h, k) of all but what pixels collect along x.
+
+        From cells to pixels along y: their first one's mean lies where the first cell of all does.
+        """
+        key = cells.per_pixel, cells.inner
         if key in self._known:
             return self._known[key]
-        blur = self._transfer
-        fx, fy = self._frequencies(cells, shape)
+        blur, n = self._transfer, cells.per_pixel
+        fx, fy = self._frequencies(cells)
         found: Array = np.ones((1, len(fy), len(fx)))
         if blur.effects:
             level = blur.level[0][:, None, None]
-            found = self._blur(fx, fy) / np.where(level > 0, level, 1.0)
+            found = self._blur(cells, fx, fy) / np.where(level > 0, level, 1.0)
         for effect in self._separable:
             found = found * np.outer(effect.along_y(fy), effect.along_x(fx))
-        kind = np.complex64 if cells.single else np.complex128
-        self._known[key] = found.astype(kind if np.iscomplexobj(found) else kind(0).real.dtype)
+        waves = np.outer(scipy.fft.fftfreq(len(fy)), cells.border + np.arange(n))
+        collected = np.exp(2j * np.pi * waves) @ self._shares(cells, -2) / n
+        found = found * collected[:, None]
+        self._known[key] = found.astype(np.complex64 if cells.single else np.complex128)
         return self._known[key]
 
-    def _frequencies(self, cells: Cells, shape: tuple[int, int]) -> tuple[Array, Array]:
+    def _frequencies(self, cells: Cells) -> tuple[Array, Array]:
         """Return the frequencies along x and y of transforms of images [cycles/m]."""
-        side_x, side_y = cells.sides
+        (side_x, side_y), shape = cells.sides, cells.inner
         return scipy.fft.rfftfreq(shape[1]) / side_x, scipy.fft.fftfreq(shape[0]) / side_y
 
-    def _blur(self, fx: Array, fy: Array) -> Array:
+    def _blur(self, cells: Cells, fx: Array, fy: Array) -> Array:
         """Return the response (C, m, n) of lens and silicon at pairs of frequencies [e/s]."""
         if self._transfer.plane_blurs:
             response: Array = self._transfer.plane_response(fx, fy)[0]
             return response
-        table = np.linspace(0, np.hypot(fx.max(), np.abs(fy).max()), ENTRIES)
-        radial, length = self._transfer.radial_response(table)[0], np.hypot(fx[None], fy[:, None])
-        return np.stack([np.interp(length, table, one) for one in radial])
+        lengths, known = self._radial(cells.sides)
+        length = np.hypot(fx[None], fy[:, None])
+        return np.stack([np.interp(length, lengths, one) for one in known])
+
+    def _radial(self, sides: tuple[float, float]) -> tuple[Array, Array]:
+        """Return frequencies (n,), up to the highest on cells [cycles/m], and the response there.
+
+        It is (C, n) [e/s].
+        """
+        if sides not in self._tables:
+            lengths = np.linspace(0, math.hypot(0.5 / sides[0], 0.5 / sides[1]), ENTRIES)
+            self._tables[sides] = lengths, self._transfer.radial_response(lengths)[0]
+        return self._tables[sides]
 
 
 def _spread(points: Array) -> Array:

@@ -78,7 +78,7 @@ ninth of the time and erred by 0.8 of those in 12, 30 in two a quarter and 0.9."
 MOST_VALUES = 1 << 33
 """Values that rays look up in a window, at most: the predicted error includes that of windows which
 need more."""
-SIDE, LONGEST = 16, 16
+SIDE, LONGEST = 8, 32
 """Side of a tile [pixels], and tiles along either side of a window, at most."""
 FEW = 4.0
 """The stated error is larger by this over the square root of all windows' pixels: how far two sums
