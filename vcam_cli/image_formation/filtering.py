@@ -330,16 +330,19 @@ class Filter:
                 for plane in every
             ]
             few = self._device.whole or len(rows.shares) * rows.count <= FEW
-            for colors in pieces(self.tables.colors, self.tables.colors if few else 1):
-                total: Array | None = None
-                for plane, of_plane in zip(planes, rows.values[:, colors], strict=True):
-                    light = (
-                        rows.shares @ of_plane if few else product(rows.shares, of_plane[0])[None]
-                    )
-                    light *= plane
-                    total = light if total is None else np.add(total, light, out=total)
-                assert total is not None
-                yield rows.part, colors, total
+            for seen, colors in self.tables.planes_by_color:
+                for part in pieces(colors.stop - colors.start, colors.stop if few else 1):
+                    own = slice(colors.start + part.start, colors.start + part.stop)
+                    total: Array | None = None
+                    for plane in seen:
+                        values = rows.values[plane, own]
+                        light = (
+                            rows.shares @ values if few else product(rows.shares, values[0])[None]
+                        )
+                        light *= planes[plane]
+                        total = light if total is None else np.add(total, light, out=total)
+                    assert total is not None
+                    yield rows.part, own, total
 
     @cached_property
     def _weights_x(self) -> Array:

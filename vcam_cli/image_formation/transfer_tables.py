@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -154,6 +155,16 @@ class Tables:
     def colors(self) -> int:
         """Number of colors."""
         return self.shape[1]
+
+    @cached_property
+    def planes_by_color(self) -> list[tuple[Array, slice]]:
+        """Mixtures (n,) that consecutive colors see, and these colors; none that see nothing."""
+        parts = [part for part in (self.radial, *self.planes) if part is not None]
+        seen = np.any([part.reshape(*self.shape, -1).any(axis=2) for part in parts], axis=0)
+        starts = np.flatnonzero(np.append(True, (seen[:, 1:] != seen[:, :-1]).any(axis=0)))
+        spans = zip(starts, np.append(starts[1:], self.colors), strict=True)
+        found = ((np.flatnonzero(seen[:, a]), slice(int(a), int(b))) for a, b in spans)
+        return [(planes, colors) for planes, colors in found if len(planes)]
 
     @property
     def is_radial(self) -> bool:
@@ -586,7 +597,8 @@ def mixtures(
 
     Where a scene has more components than colors can tell apart, singular vectors of H_kc over all
     colors and frequencies replace them, as many as keep every H_kc within `size.tolerance` of the
-    largest level.
+    largest level. Components that have no color in common, such as a layer's light and its
+    opacity, are not mixed.
 
     Parameters
     ----------
@@ -608,14 +620,38 @@ def mixtures(
     if components <= min(max(colors, 3), most):
         return every, 0.0
     table = np.concatenate([*_samples(exact, size.top), *more()], axis=1)
+    peak, mix, error = np.abs(exact.level).max() or 1.0, every[:0], 0.0
+    for part in _apart(exact.weights) if size.rank is None else [np.arange(components)]:
+        own, lost = _fewest(table[part], size.tolerance * peak, most)
+        mix, error = np.concatenate([mix, own @ every[part]]), max(error, lost / peak)
+    return mix, error
+
+
+def _apart(weights: Array) -> list[Array]:
+    """Return the components (n,) of each group that has no color in common with others.
+
+    Those that no color sees are in none.
+    """
+    seen = weights.any(axis=2).astype(int)
+    linked = np.eye(len(weights), dtype=bool)
+    while (more := linked | ((linked @ seen @ seen.T) > 0)).sum() > linked.sum():
+        linked = more
+    lit = linked[seen.any(axis=1)]
+    return [np.flatnonzero(row) for row in np.unique(lit, axis=0)[::-1]]
+
+
+def _fewest(table: Array, allowed: float, most: int) -> Mixing:
+    """Return the fewest mixtures (R, K) of a table (K, n) that err little enough, and their error.
+
+    They are at most `most`, and else all of the K.
+    """
     directions = np.linalg.eigh(product(table, table.T))[1].T[::-1]
-    peak = np.abs(exact.level).max() or 1.0
-    for rank in range(1, components):
+    for rank in range(1, len(table)):
         mix = directions[:rank]
-        error = float(np.abs(mix.T @ (mix @ table) - table).max() / peak)
-        if error <= size.tolerance or rank == most:
+        error = float(np.abs(mix.T @ (mix @ table) - table).max())
+        if error <= allowed or rank == most:
             return mix, error
-    return every, 0.0
+    return np.eye(len(table)), 0.0
 
 
 def _samples(transfer: Transfer, top: float) -> list[Array]:
