@@ -4,10 +4,13 @@ The tests run in as many processes as there are cores: threads of BLAS would onl
 gets light that another one has brought, and only tests of plots draw them.
 """
 
+import contextlib
 import gc
 import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import settings
@@ -29,18 +32,45 @@ settings.load_profile("vcam")
 
 BLANK = {"png": b"\x89PNG\r\n\x1a\n", "svg": b"<?xml", "pdf": b"%PDF"}
 """How a file begins that is written in place of a drawn plot."""
-DRAWN = plots.save
+drawn_figure = plots.plot_figure
+are_drawn = True
+"""Whether plots are drawn in the test that runs."""
 
 
-def blank(_: object, path: Path | str) -> None:
-    """Write a file in place of a plot: drawing takes a seventh of the time of the quick suite."""
+class _NotDrawnError(BaseException):
+    """A plot that is not drawn would be."""
+
+
+class _Undrawn:
+    """A figure that ends the drawing where it begins."""
+
+    def __getattr__(self, _: str) -> None:
+        raise _NotDrawnError
+
+
+@contextlib.contextmanager
+def figure_or_blank(path: Path | str, *args: Any, **options: Any) -> Iterator[Any]:
+    """Yield a figure to be drawn, or write a blank file in place of the plot.
+
+    Drawing takes a seventh of the time of the quick suite, the making of axes a twentieth.
+    """
+    if are_drawn:
+        with drawn_figure(path, *args, **options) as figure:
+            yield figure
+        return
+    with contextlib.suppress(_NotDrawnError):
+        yield _Undrawn()
     with write_whole(path) as temporary:
         Path(temporary).write_bytes(BLANK[Path(path).suffix.removeprefix(".")])
 
 
+plots.plot_figure = figure_or_blank  # before other modules import it by its name
+
+
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Draw plots in tests with the mark `draws` and in their fixtures, nowhere else."""
-    plots.save = DRAWN if "draws" in item.keywords else blank
+    """Draw plots in tests with the mark `draws` and in their fixtures, and in all `long` runs."""
+    global are_drawn
+    are_drawn = "draws" in item.keywords or "not long" not in item.config.option.markexpr
 
 
 def pytest_collection_finish() -> None:

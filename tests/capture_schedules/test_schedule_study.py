@@ -460,7 +460,7 @@ HARD = [
 ]
 
 
-@pytest.mark.parametrize("pdf", HARD)
+@pytest.mark.parametrize("pdf", [pytest.param(HARD[0], marks=pytest.mark.draws), *HARD[1:]])
 @pytest.mark.parametrize("sensor", [None, SENSOR | {"max_time": "1 s", "dark_current": "1 fA"}])
 def test_hard_pdfs_have_plain_answers(pdf, sensor):
     methods = ["optimal", "heuristic", "uniform", "exponential", "geometric"]
