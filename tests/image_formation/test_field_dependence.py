@@ -1,6 +1,7 @@
 """A lens that changes over the field, against the transfer of every pixel's own wavefront."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -20,67 +21,87 @@ STEEP = ((0.0, ()), (1.0, ((8, 260e-9), (4, 200e-9))))
 """From 8 waves a pupil radius on a grid of the pupil is computed."""
 
 
-def by_own_wavefronts(
-    picture: np.ndarray, g, field: FieldBlur, lens: Diffraction, copies=((0.0, 0.0),)
-) -> np.ndarray:
-    """Pixels (rows, columns) of a mirrored picture: a Fourier series for each of them.
+SENSOR = sensor(6, 8)
+PICTURE = np.random.default_rng(3).random((6, 8))
+HALF_DIAGONAL = float(np.hypot(SENSOR.sensor_width, SENSOR.sensor_height)) / 2
+PERFECT = Diffraction(4.0, 0.0)
+HIGHEST = int(PERFECT.cutoff(WAVELENGTHS[0]) * 16 * PITCH) + 1
+"""Harmonic of the mirrored picture that the lens still images."""
+FX, FY = (np.arange(-HIGHEST, HIGHEST + 1) / (n * PITCH) for n in (16, 12))
+
+
+def offsets(row: int, column: int) -> tuple[float, float]:
+    """How far a pixel lies from the middle of the array, along y and along x [m]."""
+    return (
+        (row + 0.5) * PITCH - SENSOR.sensor_height / 2,
+        (column + 0.5) * PITCH - SENSOR.sensor_width / 2,
+    )
+
+
+@cache
+def own_transfers(field: FieldBlur) -> dict[tuple[int, int], np.ndarray]:
+    """Transfer (fy, fx) of every pixel's own wavefront, at all wavelengths together."""
+    perfect = {w: PERFECT.otf(np.hypot(FX, FY[:, None]), w) for w in WAVELENGTHS}
+    found = {}
+    for pixel in np.ndindex(PICTURE.shape):
+        y, x = offsets(*pixel)
+        terms = field.wavefront(np.hypot(x, y) / field.half_diagonal)
+        own = DirectedBlur(field.lens, terms, angle=np.arctan2(y, x))
+        total = sum(own.otf_plane(FX, FY, w) * perfect[w] for w in WAVELENGTHS)
+        found[pixel] = total / len(WAVELENGTHS)
+    return found
+
+
+def by_own_wavefronts(field: FieldBlur, copies=((0.0, 0.0),)) -> np.ndarray:
+    """Pixels (rows, columns) of the mirrored picture: a Fourier series for each of them.
 
     Their light is the mean over `copies` of the image, displaced along x and y [m].
     """
-    twice = np.concatenate([picture, picture[::-1]])
+    twice = np.concatenate([PICTURE, PICTURE[::-1]])
     twice = np.concatenate([twice, twice[:, ::-1]], axis=1)
     coefficients = np.fft.fft2(twice) / twice.size
-    highest = int(lens.cutoff(WAVELENGTHS[0]) * max(twice.shape) * PITCH) + 1
-    k = np.arange(-highest, highest + 1)
-    fy, fx = (k / (n * PITCH) for n in twice.shape)
+    k = np.arange(-HIGHEST, HIGHEST + 1)
     series = coefficients[np.ix_(k % twice.shape[0], k % twice.shape[1])]
-    series = series * np.outer(np.sinc(fy * PITCH), np.sinc(fx * PITCH))  # samples are squares
-    series = series * np.outer(aperture(g).along_y(fy), aperture(g).along_x(fx))
-    moved = [np.exp(-2j * np.pi * (fx * dx + fy[:, None] * dy)) for dx, dy in copies]
+    series = series * np.outer(np.sinc(FY * PITCH), np.sinc(FX * PITCH))  # samples are squares
+    series = series * np.outer(aperture(SENSOR).along_y(FY), aperture(SENSOR).along_x(FX))
+    moved = [np.exp(-2j * np.pi * (FX * dx + FY[:, None] * dy)) for dx, dy in copies]
     series = series * np.mean(moved, axis=0)
-    perfect = {w: lens.otf(np.hypot(fx, fy[:, None]), w) for w in WAVELENGTHS}
-    found = np.zeros(picture.shape)
-    for row, column in np.ndindex(picture.shape):
-        at = (row + 0.5) * PITCH, (column + 0.5) * PITCH
-        y, x = at[0] - g.sensor_height / 2, at[1] - g.sensor_width / 2
-        terms = field.wavefront(np.hypot(x, y) / field.half_diagonal)
-        own = DirectedBlur(field.lens, terms, angle=np.arctan2(y, x))
-        total = sum(own.otf_plane(fx, fy, w) * perfect[w] for w in WAVELENGTHS) / len(WAVELENGTHS)
+    found = np.zeros(PICTURE.shape)
+    for (row, column), total in own_transfers(field).items():
         # the samples' first center lies half a pitch from the edge
         along_y, along_x = (
-            np.exp(2j * np.pi * f * (p - PITCH / 2)) for f, p in zip((fy, fx), at, strict=True)
+            np.exp(2j * np.pi * f * n * PITCH) for f, n in ((FY, row), (FX, column))
         )
         found[row, column] = (along_y @ (series * total) @ along_x).real
     return found
 
 
-@pytest.fixture(scope="module")
-def truths():
-    """A noisy picture of 6 x 8 pixels through each field, and that field."""
-    g = sensor(6, 8)
-    picture = np.random.default_rng(3).random((6, 8))
-    half_diagonal = float(np.hypot(g.sensor_width, g.sensor_height)) / 2
-    found = {}
-    for name, places in (("even", GROWING), ("uneven", WITHOUT_SYMMETRY), ("steep", STEEP)):
-        field = FieldBlur(LENS, places, half_diagonal)
-        found[name] = field, by_own_wavefronts(picture, g, field, Diffraction(4.0, 0.0))
-    return g, picture, found
-
-
-@pytest.mark.parametrize("name", ["even", "uneven", "steep"])
+@pytest.mark.parametrize(
+    "places",
+    [
+        pytest.param(GROWING, id="even"),
+        pytest.param(WITHOUT_SYMMETRY, id="uneven"),
+        pytest.param(STEEP, id="steep"),
+    ],
+)
 @pytest.mark.parametrize(
     "knobs", [DRAFT, STANDARD, REFERENCE], ids=["draft", "standard", "reference"]
 )
-def test_every_pixel_has_its_own_wavefront(knobs, name, truths):
-    g, picture, fields = truths
-    field, expected = fields[name]
+def test_every_pixel_has_its_own_wavefront(knobs, places):
+    field = FieldBlur(LENS, places, HALF_DIAGONAL)
+    expected = by_own_wavefronts(field)
     tolerance = {DRAFT: 0.02, STANDARD: 0.005, REFERENCE: 0.0005}[knobs]
-    knobs = replace(knobs, tolerance=tolerance)
-    effects = Diffraction(4.0, 0.0), field, aperture(g)
-    transfer = light(*effects, wavelengths=WAVELENGTHS)
-    found = signal(path(g, *effects, transfer=transfer, knobs=knobs), of_picture(picture, PITCH))
+    found = through(field, knobs=replace(knobs, tolerance=tolerance))
     assert rms(found, expected) <= tolerance, rms(found, expected) / tolerance
-    assert rms(expected, picture) > 0.05
+    assert rms(expected, PICTURE) > 0.05
+
+
+def through(*blurs, knobs) -> np.ndarray:
+    """The picture through the lens and some blurs."""
+    effects = PERFECT, *blurs, aperture(SENSOR)
+    transfer = light(*effects, wavelengths=WAVELENGTHS)
+    optical_path = path(SENSOR, *effects, transfer=transfer, knobs=knobs)
+    return signal(optical_path, of_picture(PICTURE, PITCH))
 
 
 COPIES = 1.6e-6, 1.1e-6
@@ -107,15 +128,8 @@ FAR = 300e-6
 )
 def test_a_filter_that_doubles_the_image_acts_beside_a_field(filter_kind, plates, copies):
     """Displaced copies of what every pixel's own wavefront makes."""
-    g = sensor(6, 8)
-    picture = np.random.default_rng(3).random((6, 8))
-    half_diagonal = float(np.hypot(g.sensor_width, g.sensor_height)) / 2
-    field, lens = FieldBlur(LENS, GROWING, half_diagonal), Diffraction(4.0, 0.0)
-    expected = by_own_wavefronts(picture, g, field, lens, copies)
-    effects = lens, field, filter_kind(plates), aperture(g)
-    transfer = light(*effects, wavelengths=WAVELENGTHS)
-    knobs = replace(REFERENCE, tolerance=0.0005)
-    found = signal(path(g, *effects, transfer=transfer, knobs=knobs), of_picture(picture, PITCH))
+    field = FieldBlur(LENS, GROWING, HALF_DIAGONAL)
+    expected = by_own_wavefronts(field, copies)
+    found = through(field, filter_kind(plates), knobs=replace(REFERENCE, tolerance=0.0005))
     assert rms(found, expected) <= 0.0005
-    without = by_own_wavefronts(picture, g, field, lens)
-    assert rms(expected, without) > 0.01
+    assert rms(expected, by_own_wavefronts(field)) > 0.01
