@@ -69,7 +69,9 @@ def lookup(picture: np.ndarray, size, x: np.ndarray, y: np.ndarray, mirrored: bo
             index = np.where(index < count, index, 2 * count - 1 - index)
         at.append((np.clip(index, 0, count - 1), inside))
     (rows, lit_y), (columns, lit_x) = at
-    return picture[np.ix_(rows, columns)] * np.outer(lit_y, lit_x)
+    found = picture[rows][:, columns]
+    found[~lit_y], found[:, ~lit_x] = 0, 0
+    return found
 
 
 def composed(scene: Scene, x: np.ndarray, y: np.ndarray, u: float, v: float) -> np.ndarray:
@@ -78,8 +80,11 @@ def composed(scene: Scene, x: np.ndarray, y: np.ndarray, u: float, v: float) -> 
     for layer in scene.layers:
         blur, size = scene.blur_radius(layer), scene.size(layer)
         place = size, x + blur * u, y + blur * v
+        light = lookup(layer.light, *place, mirrored=True)
+        if layer.width is None and layer.opacity.min() == 1:
+            return seen + clear * light  # nothing is behind it
         cover = lookup(layer.opacity, *place, mirrored=layer.width is None)
-        seen = seen + clear * cover * lookup(layer.light, *place, mirrored=True)
+        seen = seen + clear * cover * light
         clear = clear * (1 - cover)
     return np.asarray(seen)
 
@@ -278,7 +283,9 @@ def pupil_sum(
         between = 2 * np.abs(np.float32(u) * apart_x + np.float32(v) * apart_y)
         inside = apart_x**2 + apart_y**2 + between <= 1 - u**2 - v**2
         if opens is not None:  # a ray through (u, v) brings a near point to the other side
-            inside &= opens(apart_x - u, apart_y - v) & opens(-apart_x - u, -apart_y - v)
+            at = np.float32(u), np.float32(v)
+            inside &= opens(apart_x - at[0], apart_y - at[1])
+            inside &= opens(-apart_x - at[0], -apart_y - at[1])
         total += np.where(inside, seen, 0)
         counted += inside
     nu = np.minimum(np.hypot(apart_x, apart_y), 1)

@@ -332,11 +332,13 @@ def slope_sum(own: Setup, light: np.ndarray, inverse: np.ndarray, count: int) ->
     edges = (np.arange(3 * h + 1) / h - 1.5) * high
     x = centers(columns, own.pitch_x) + left
     y = centers(rows, own.pitch_y)[:, None] + top
-    total, row = np.zeros((rows, columns)), np.arange(3 * h)[:, None]
+    blur_of_edges, blur_of_rows = blur(own, meets), blur(own, depth)
+    total = np.zeros((rows, columns))
     for u, v, _ in zip(*rays(count), strict=True):
-        moved = edges - v * blur(own, meets)
+        moved = edges - v * blur_of_edges
         overlap = np.minimum(y + height / 2, moved[1:]) - np.maximum(y - height / 2, moved[:-1])
-        aside = u * blur(own, depth)[:, None]
+        (row,) = np.nonzero((overlap > 0).any(axis=0))  # what no pixel sees is two thirds
+        aside, overlap, row = u * blur_of_rows[row, None], overlap[:, row], row[:, None]
         parts = []
         for end in (x - width / 2, x + width / 2):
             at = ((end + aside) / wide + 1.5) * w
