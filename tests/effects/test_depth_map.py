@@ -140,7 +140,7 @@ def test_layers_are_as_many_as_the_tolerance_asks_for(tmp_path):
     depth = np.repeat(np.geomspace(0.5, 2, 64)[:, None], 64, axis=1)
     given = with_depth(tmp_path, light, depth, 1.0)
     counts, errors = [], []
-    for accuracy in ("draft", "standard", "0.1 %"):
+    for accuracy in ("5 %", "draft", "standard"):
         _, frame = seen(tmp_path, given, {"accuracy": accuracy, "array.rows": 16})
         counts.append(frame.spectrum.cut.layers)
         errors.append(frame.scene.cut.error)

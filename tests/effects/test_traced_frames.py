@@ -86,7 +86,7 @@ def test_pixels_see_the_convolution_of_their_own_place(tmp_path, kind):
     )
     found = simulate(model).electrons / simulate(even).electrons
     rng = np.random.default_rng(4)
-    rows, columns = rng.integers(10, ROWS - 10, 24), rng.integers(10, COLUMNS - 10, 24)
+    rows, columns = rng.integers(10, ROWS - 10, 12), rng.integers(10, COLUMNS - 10, 12)
     errors = []
     for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
         x, y = ((n + 0.5 - size / 2) * PITCH for n, size in ((column, COLUMNS), (row, ROWS)))
