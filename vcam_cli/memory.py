@@ -1,9 +1,10 @@
-"""The memory that this process may still take."""
+"""The memory that this process has taken, and may still take."""
 
 from __future__ import annotations
 
 import contextlib
 import os
+import sys
 from pathlib import Path
 
 from vcam_cli.errors import CannotDo
@@ -41,6 +42,18 @@ def available() -> int:
         with contextlib.suppress(OSError, ValueError, AttributeError):
             found.append(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     return min(found)
+
+
+def peak_memory() -> int:
+    """Return the largest memory of this process so far [bytes]."""
+    # Linux's `ru_maxrss` begins with the memory of the process that started this one.
+    with contextlib.suppress(OSError, StopIteration):
+        lines = Path("/proc/self/status").read_text("ascii").splitlines()
+        return 1024 * int(next(line for line in lines if line.startswith("VmHWM:")).split()[1])
+    import resource  # not on Windows
+
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak if sys.platform == "darwin" else peak * 1024
 
 
 def limit_blas_threads() -> None:

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-CHILD = "from vcam_cli.simulation.output.outputs import peak_memory; print(peak_memory())"
+CHILD = "from vcam_cli.memory import peak_memory; print(peak_memory())"
 PARENT = (
     "import subprocess, sys\n"
     "held = b'x' * 400_000_000\n"
@@ -16,7 +16,7 @@ PARENT = (
 @pytest.mark.skipif(sys.platform != "linux", reason="reads the peak from /proc")
 def test_memory_of_the_process_that_started_it_does_not_count():
     done = subprocess.run([sys.executable, "-c", PARENT], capture_output=True, text=True)
-    assert 20e6 < int(done.stdout) < 350e6, done
+    assert 5e6 < int(done.stdout) < 350e6, done
 
 
 def test_memory_that_was_held_counts():

@@ -7,11 +7,8 @@ still being written; files are most of a frame's cost.
 
 from __future__ import annotations
 
-import resource
-import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -30,6 +27,7 @@ from vcam_cli.files.images.rows import Attribute
 from vcam_cli.files.report import hash_file, hash_text, to_json
 from vcam_cli.files.spectral.exr import RADIANCE, WHITE, write_spectral
 from vcam_cli.files.tables import write_metrics
+from vcam_cli.memory import peak_memory
 from vcam_cli.parallel import ThreadPool
 from vcam_cli.processing.color_correction import CHROMATICITIES
 from vcam_cli.simulation import scene_radiance, spectral_irradiance
@@ -380,13 +378,3 @@ def record(result: Photograph, inputs: tuple[Path, ...], seconds: float) -> dict
         "versions": versions(),
         "notes": list(result.notes),
     }
-
-
-def peak_memory() -> int:
-    """Return the largest memory of this process so far [bytes]."""
-    # Linux's `ru_maxrss` begins with the memory of the process that started this one.
-    with suppress(OSError, StopIteration):
-        lines = Path("/proc/self/status").read_text("ascii").splitlines()
-        return 1024 * int(next(line for line in lines if line.startswith("VmHWM:")).split()[1])
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak if sys.platform == "darwin" else peak * 1024
