@@ -15,6 +15,9 @@ from vcam_cli.camera.camera import Camera
 PLANCK, LIGHT, CHARGE, BOLTZMANN = 6.62607015e-34, 299792458.0, 1.602176634e-19, 1.380649e-23
 """CODATA 2018, exact in the SI; written out here so that nothing is taken from the package."""
 
+DUMPER = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+"""The one in C takes a fifth of the time: a hundredth of that of the quick suite."""
+
 GONE = object()
 """Stands for a key that is taken out."""
 
@@ -83,7 +86,7 @@ def with_changes(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any
 def camera(folder: Path, changes: dict[str, Any] | None = None) -> Camera:
     """The plain camera with changes, written to `folder` as YAML and read back."""
     path = folder / "made.yaml"
-    path.write_text(yaml.safe_dump(tree(changes or {}), sort_keys=False), encoding="utf-8")
+    path.write_text(yaml.dump(tree(changes or {}), Dumper=DUMPER, sort_keys=False), "utf-8")
     return load(path)
 
 

@@ -1,6 +1,7 @@
 """Electrons to volts to codes, and the figures of merit."""
 
 import math
+from functools import cache
 
 import numpy as np
 import pint
@@ -10,11 +11,12 @@ from hypothesis import strategies as st
 
 from vcam_cli.physics import readout as ro
 
-units = pint.UnitRegistry()
+unit_registry = cache(pint.UnitRegistry)
 gains = st.floats(1e-7, 1e-3)
 
 
 def test_conversion_gain_by_a_unit_library() -> None:
+    units = unit_registry()
     gain = (units.elementary_charge / (12 * units.femtofarad)).to("microvolt").magnitude
     assert ro.conversion_gain(12e-15) * 1e6 == pytest.approx(gain, rel=1e-9)
     assert ro.conversion_gain(1.602176634e-19) == 1
@@ -22,6 +24,7 @@ def test_conversion_gain_by_a_unit_library() -> None:
 
 def test_reset_noise_by_a_unit_library() -> None:
     """20 fF at 300 K: 56.8 electrons."""
+    units = unit_registry()
     thermal = units.boltzmann_constant * 300 * units.kelvin * 20 * units.femtofarad
     sigma = (thermal**0.5 / units.elementary_charge).to("").magnitude
     assert math.sqrt(ro.reset_noise_variance(20e-15, 300)) == pytest.approx(sigma, rel=1e-9)

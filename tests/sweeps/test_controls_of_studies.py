@@ -1,15 +1,15 @@
 """Shipped studies compare like with like: a shift is that of one change, in the same average."""
 
 import pytest
-import yaml
 
 from vcam_cli import units
 from vcam_cli.config import shipped
+from vcam_cli.config.yaml_reader import read_file
 
 STUDIES = {
     file.stem: study
     for file in shipped.files("studies").values()
-    if (study := yaml.safe_load(file.read_text(encoding="utf-8")))["kind"] == "sweep"
+    if (study := read_file(file).plain())["kind"] == "sweep"
 }
 
 
