@@ -31,11 +31,9 @@ def test_other_numbers_other_pictures(tmp_path):
     assert drawn(tmp_path / "a.png", one) != drawn(tmp_path / "b.png", moved)
 
 
-@pytest.mark.parametrize(
-    "values", [X, -X, np.full(30, np.nan), np.full(30, np.inf), np.zeros(30), X[:0]]
-)
-def test_whatever_the_numbers_it_draws(values, tmp_path):
+def test_whatever_the_numbers_it_draws(tmp_path):
     """Without a warning: what has no place on the axes is left out."""
-    curves = (Curve("all", X[: len(values)], values), *CURVES)
+    odd = [-X, np.full(30, np.nan), np.full(30, np.inf), np.zeros(30), X[:0]]
+    curves = (*(Curve("odd", X[: len(values)], values) for values in odd), *CURVES)
     panels = [Panel("x", "y", curves, log=log) for log in ("", "x", "y", "xy")]
     assert drawn(tmp_path / "a.png", *panels).startswith(b"\x89PNG")
