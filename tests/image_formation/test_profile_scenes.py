@@ -7,9 +7,10 @@ from functools import cache
 import numpy as np
 import pytest
 from optical_paths import PITCH, aperture, on_chart, path, rms, sensor, signal
-from scipy.special import struve
+from scipy.special import sici, struve
 
 from vcam_cli.effects.optics.diffraction import Diffraction
+from vcam_cli.effects.optics.point_spread import PointSpread
 from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
 from vcam_cli.image_formation.settings import STANDARD
 from vcam_cli.scenes.base import Frame
@@ -71,6 +72,38 @@ def test_edges_against_the_line_spread_of_a_perfect_lens(shape, angle):
     expected = [DARK + (BRIGHT - DARK) * each for each in (bright, 1 - bright)]
     # which side is bright is the chart's; midpoints of a pixel's area err by some 1e-5
     assert min(rms(found, each) for each in expected) < 4e-5
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.1, -0.7, math.pi / 2])
+@pytest.mark.parametrize("pitch", [1e-6, 3e-6])
+def test_edges_against_the_sine_integrals_of_a_measured_spread(pitch, angle):
+    """Each sample is a sinc function, which rings where it is coarser than the pixels.
+
+    An edge behind one is a sine integral; means over the areas are Gauss's.
+    """
+    samples = np.random.default_rng(4).random((5, 7)) + 3 * np.pad([[1.0]], [(1, 3), (4, 2)])
+    samples /= samples.sum()
+    g = sensor(12, 16, fill=(0.8, 0.6))
+    spread = PointSpread("spread", pitch, (), samples[None], b"")
+    optical_path = path(g, spread, aperture(g), knobs=finely(1e-6))
+    found = signal(optical_path, on_chart(optical_path, SlantedEdge(angle, 0.6), margin=4))
+    node, weight = np.polynomial.legendre.leggauss(8)
+    sides = (g.collecting_width, math.cos(angle)), (g.collecting_height, math.sin(angle))
+    across = sum(
+        np.expand_dims(node / 2 * side * part, 1 - axis) for axis, (side, part) in enumerate(sides)
+    )
+    share = np.outer(weight, weight) / 4
+    end = 0.5 / pitch / max(abs(part) for _, part in sides)
+    u = (np.arange(16) - 7.5) * PITCH * sides[0][1]
+    u = u + (np.arange(12)[:, None] - 5.5) * PITCH * sides[1][1]
+    bright = np.full(u.shape, 0.5)
+    for (row, column), part in np.ndenumerate(samples):
+        place = ((column - 3) * sides[0][1] + (row - 2) * sides[1][1]) * pitch
+        seen = 2 * math.pi * end * (u[..., None, None] + across - place)
+        bright += part / math.pi * (sici(seen)[0] * share).sum(axis=(2, 3))
+    # which side is bright is the chart's
+    expected = [DARK + (BRIGHT - DARK) * (0.5 + sign * (bright - 0.5)) for sign in (1, -1)]
+    assert min(rms(found, each) for each in expected) < 2e-7
 
 
 @pytest.mark.parametrize("tolerance", [0.02, 0.005, 2e-4])

@@ -47,6 +47,23 @@ class Blur(Effect):
             Frequency [cycles/m]; inf where there is no such frequency.
         """
 
+    def cutoff_along(self, across: tuple[float, float], wavelength: float) -> float:
+        """Return the frequency from which the transfer of waves in one direction is zero.
+
+        Parameters
+        ----------
+        across : tuple of float
+            Unit vector (x, y) along which the waves change.
+        wavelength : float
+            Wavelength [m].
+
+        Returns
+        -------
+        float
+            Frequency [cycles/m]; inf where there is no such frequency.
+        """
+        return self.cutoff(wavelength)
+
     def axis_cutoff(self, wavelength: float) -> float:
         """Return the frequency along x, and along y, from which the transfer is zero.
 

@@ -8,7 +8,9 @@ a photodetector's average A an edge of height 1 at u = 0 becomes
 f along u. The integral is a sum over f = k / P: the image of a step that repeats with the period P
 less a ramp, which is added again, as far displaced as the light's centroid is. Tails of its
 neighbors are known: behind H = 1 - c |f| of low frequencies a line's light falls as c / (2 pi^2
-u^2). No margin and no cell is involved: arrays of any shape are exact.
+u^2). A transfer that ends with a jump, as that of a measured spread does at its samples' Nyquist
+frequency, is a parabola up to there, whose image is elementary, and a rest without a jump. No
+margin and no cell is involved: arrays of any shape are exact.
 """
 
 from __future__ import annotations
@@ -87,13 +89,20 @@ def profile_layers(path: OpticalPath, profile: Profile) -> tuple[Layers, Spectru
     return iter([Layer(values)]), report
 
 
+def _end(path: OpticalPath, across: tuple[float, float]) -> float:
+    """Return the frequency beyond which waves across edges are zero [cycles/m]."""
+    waves = path.transfer.wavelengths.tolist()
+    own = (max(b.cutoff_along(across, w) for w in waves) for b in of_kind(path.effects, Blur))
+    return min(path.transfer.cutoff, *own)
+
+
 def _otfs(path: OpticalPath, across: tuple[float, float]) -> dict[Effect, Array] | None:
     """Return the transfer (J or 1, n) of every blur of a path at frequencies across edges.
 
     They lie evenly from 0 to the cut-off.
     """
     count = min(path.settings.table_size, MOST_ENTRIES)
-    frequency = np.linspace(0, path.transfer.cutoff, count)
+    frequency = np.linspace(0, _end(path, across), count)
     found: dict[Effect, Array] = {}
     for blur in of_kind(path.effects, Blur):
         transfer = blur.spectral_otf_along(frequency, across, path.transfer.wavelengths)
@@ -117,6 +126,16 @@ class EdgeImage:
     profile: Profile
     otfs: dict[Effect, Array]
     """Effect -> transfer (J or 1, n) evenly from 0 to the cut-off."""
+
+    @cached_property
+    def cutoff(self) -> float:
+        """The frequency beyond which waves across edges are zero [cycles/m]."""
+        return _end(self.path, self.profile.across)
+
+    @property
+    def jump(self) -> Array:
+        """What the transfer (C,) ends with [e/s], 0 of a lens that diffracts."""
+        return np.asarray(self.whole[:, -1])
 
     @property
     def level(self) -> Array:
@@ -169,7 +188,7 @@ class EdgeImage:
 
         Terms with the square of f do not count.
         """
-        lowest = self.path.transfer.cutoff / (self.whole.shape[1] - 1)
+        lowest = self.cutoff / (self.whole.shape[1] - 1)
         first, second = (self.whole[:, n] / np.maximum(self.level, 1e-300) for n in (1, 2))
         moved = -np.imag(first) / (2 * np.pi * lowest)
         return moved, (4 * (1 - first.real) - (1 - second.real)) / (2 * lowest)
@@ -195,11 +214,15 @@ class EdgeImage:
         spread = sum(spreads.values())
         lean = sum(s for e, s in spreads.items() if not e.is_even)
         leaning = math.sqrt(4 * spread * lean / (math.pi * self.allowed))
-        return max(PERIODS * (self.farthest + spread), SPREADS * spread, leaning)
+        # A rest that ends with the slope s leaves the tail s / (4 pi^3 f u^2) of an edge.
+        last = np.abs(self.whole[:, -1] - self.whole[:, -2]) * (self.whole.shape[1] - 1)
+        slope = float((last + 2 * np.abs(self.jump)).max() / (self.level.max() or 1.0))
+        ending = math.sqrt(slope / (4 * math.pi**3 * self.allowed)) / self.cutoff
+        return max(PERIODS * (self.farthest + spread), SPREADS * spread, leaning, ending)
 
     def _moment(self, power: int) -> float:
         """Return a bound on a derivative of an edge's image, over its level [1 / m^power]."""
-        transfer, top = np.abs(self.whole).max(axis=0), self.path.transfer.cutoff
+        transfer, top = np.abs(self.whole).max(axis=0), self.cutoff
         f = np.linspace(0, top, transfer.shape[0])
         waves = 2 * (2 * np.pi * f) ** (power - 1) * transfer
         return float(waves.mean() * top / (self.level.max() or 1.0))
@@ -211,7 +234,7 @@ class EdgeImage:
         A cubic through four places a step h apart errs by 3/128 h^4 times the fourth derivative.
         """
         step = (self.allowed * 128 / 3 / self._moment(4)) ** 0.25
-        step = min(step, 1 / (2.2 * self.path.transfer.cutoff))
+        step = min(step, 1 / (2.2 * self.cutoff))
         count = self.period / step
         return (
             int(scipy.fft.next_fast_len(math.ceil(count), real=True))
@@ -236,14 +259,15 @@ class EdgeImage:
     def table(self) -> tuple[Array, int]:
         """Return the image of an edge (C, entries) [e/s], and the place of the first [steps]."""
         count = math.ceil(self.farthest / (self.period / self.entries)) + 3
-        top, terms = self.path.transfer.cutoff, int(self.period * self.path.transfer.cutoff)
+        top, terms = self.cutoff, int(self.period * self.cutoff)
         f = np.arange(1, terms + 1) / self.period
         at = np.linspace(0, top, self.whole.shape[1])
         place = np.arange(-count, count + 1)
         coarse = []
-        colors = zip(self.whole, self.level, *self.tails(), strict=True)
-        for transfer, level, moved, fall in colors:
-            parts = (np.interp(f, at, part) for part in (transfer.real, transfer.imag))
+        colors = zip(self.whole, self.jump, self.level, *self.tails(), strict=True)
+        for transfer, jump, level, moved, fall in colors:
+            rest = transfer - jump * (at / top) ** 2
+            parts = (np.interp(f, at, part) for part in (rest.real, rest.imag))
             sines, cosines = (part / (np.pi * np.arange(1, terms + 1)) for part in parts)
             series = np.zeros(self.entries // 2 + 1, complex)
             series[1 : terms + 1] = (cosines - 1j * sines) * (self.entries / 2)
@@ -253,7 +277,8 @@ class EdgeImage:
             near = np.where(np.abs(u) < 1e-4, 1e-4, u)
             neighbors = 1 / near - np.pi / np.tan(np.pi * near)
             others = fall / (2 * np.pi**2 * self.period) * neighbors * (u / near)
-            coarse.append(wave[place] + level * (0.5 + u - others))
+            ended = _ended(jump, 2 * np.pi * top * self.period / self.entries * place)
+            coarse.append(wave[place] + ended + level * (0.5 + u - others))
         first = (1 - count) * self.refined
         return np.array([_refined(line, self.refined) for line in coarse]), first
 
@@ -279,7 +304,7 @@ class EdgeImage:
         )
         energy = float(np.square(np.diff(self.profile.levels)).sum()) * length
         energy /= g.sensor_width * g.sensor_height
-        top = self.path.transfer.cutoff
+        top = self.cutoff
         f = np.linspace(0, top, self.whole.shape[1])[1:]
         found = {}
         for effect in self.otfs:
@@ -287,6 +312,30 @@ class EdgeImage:
             lost = np.square(np.abs(rest - self.whole)[:, 1:]) / np.square(2 * np.pi * f)
             found[effect.name] = math.sqrt(2 * energy * float(lost.mean(axis=1).max()) * top)
         return found
+
+
+def _ended(jump: complex, phase: Array) -> Array:
+    """Return the image of an edge behind a transfer that rises with the square of the frequency.
+
+    It is Im(jump integral_0^1 t exp(i phase t) dt) / pi.
+
+    Parameters
+    ----------
+    jump : complex
+        Transfer where it ends.
+    phase : Array
+        Distances (n,) from the edge times 2 pi times the frequency where it ends.
+
+    Returns
+    -------
+    Array
+        Image (n,) in the unit of the transfer, without what is the same everywhere.
+    """
+    near = np.abs(phase) < 0.01
+    w = np.where(near, 1.0, phase)
+    far = (np.exp(1j * w) * (1 - 1j * w) - 1) / w**2
+    series = 1 / 2 + 1j * phase / 3 - phase**2 / 8 - 1j * phase**3 / 30
+    return np.asarray((jump * np.where(near, series, far)).imag / np.pi)
 
 
 def _refined(line: Array, parts: int) -> Array:

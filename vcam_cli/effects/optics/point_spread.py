@@ -18,6 +18,7 @@ from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.blurs import PlaneTransfer
 from vcam_cli.effects.optics.wavefront_blur import AberrationBlur, largest_loss
+from vcam_cli.parallel import pieces
 from vcam_cli.physics.cache import ByteCache
 
 PSF = "optics.psf"
@@ -25,6 +26,9 @@ PSF = "optics.psf"
 
 LEAST_PHASE = 1e-3
 """Phase below which the cosine integral, infinite at a sample itself, counts as there: 6.3."""
+
+AT_ONCE = 4096
+"""Frequencies in one direction that are computed at once: 64 kB for each row of samples."""
 
 ROUNDING = 1e-9
 """Part of the Nyquist frequency within which a frequency counts as on it: nothing passes there."""
@@ -127,10 +131,34 @@ class PointSpread(AberrationBlur, PlaneTransfer):
         within_x, within_y = (np.abs(f) < self.axis_cutoff(wavelength) for f in (fx, fy))
         return self.smooth_otf_plane(fx, fy, wavelength) * np.outer(within_y, within_x)
 
+    def otf_along(self, frequency: Array, across: tuple[float, float], wavelength: float) -> Array:
+        """Return the transfer (n,) of waves in one direction, its end included."""
+        key = frequency.tobytes(), across
+
+        def compute() -> Array:
+            some = pieces(len(frequency), AT_ONCE)
+            return np.concatenate([self._channels_along(frequency[s], across) for s in some], 1)
+
+        transfer = self._at(self._transfer_cache.get(key, compute), wavelength)
+        return transfer * (np.abs(frequency) <= self.cutoff_along(across, wavelength))
+
+    def _channels_along(self, frequency: Array, across: tuple[float, float]) -> Array:
+        """Return the Fourier sums of the samples in one direction: (channels, n)."""
+        x, y = self._coordinates
+        along = np.exp(-2j * np.pi * across[0] * np.outer(x, frequency))
+        down = np.exp(-2j * np.pi * across[1] * np.outer(y, frequency))
+        samples = self._loaded_samples()
+        return np.array([np.einsum("yn,yn->n", down, plane @ along) for plane in samples])
+
     def smooth_otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
         """Return the Fourier sums of the samples, periodic in fx and fy: complex (m, n)."""
         key = (fx.tobytes(), fy.tobytes())
-        channels = self._transfer_cache.get(key, lambda: self._channel_transfers(fx, fy))
+        return self._at(
+            self._transfer_cache.get(key, lambda: self._channel_transfers(fx, fy)), wavelength
+        )
+
+    def _at(self, channels: Array, wavelength: float) -> Array:
+        """Return the transfer at a wavelength between those of the channels (channels, ...)."""
         if len(self.wavelengths) < 2:
             copied: Array = channels[0].copy()
             return copied
@@ -156,6 +184,10 @@ class PointSpread(AberrationBlur, PlaneTransfer):
     def cutoff(self, wavelength: float) -> float:
         """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
         return math.sqrt(0.5) / self.pitch
+
+    def cutoff_along(self, across: tuple[float, float], wavelength: float) -> float:
+        """Return where waves in one direction are zero along either axis [cycles/m]."""
+        return self.axis_cutoff(wavelength) / max(map(abs, across))
 
     def axis_cutoff(self, wavelength: float) -> float:
         """Return the Nyquist frequency of the samples, less what rounding may bring a term to."""
