@@ -9,7 +9,7 @@ import math
 import shutil
 import statistics
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,6 +26,7 @@ from vcam_cli.effects.signal_chain import NoiseSource
 from vcam_cli.files.images.png import write_png
 from vcam_cli.floats import rms
 from vcam_cli.simulation.preparation import Prepared
+from vcam_cli.simulation.shared import Shared
 from vcam_cli.simulation.simulate import prepare
 
 PRESETS = ("draft", "standard", "reference")
@@ -535,15 +536,18 @@ def idle_work(camera: Camera) -> list[tuple[str, bool]]:
 
 
 def seconds(camera: Camera) -> tuple[float, float]:
-    """Processor time of a frame with its render: auto at standard, all at reference, medians."""
+    """Processor time of a frame with its render: auto at standard, all at reference, medians.
+
+    Every frame forms its own light.
+    """
     everything = ablation.with_effects(at_preset(camera, "reference"), "all")
-    return _timed(lambda: simulate(camera).render), _timed(lambda: simulate(everything).render)
+    return _timed(camera), _timed(everything)
 
 
-def _timed(work: Callable[[], object]) -> float:
+def _timed(camera: Camera) -> float:
     runs: list[float] = []
     while not is_median_known(runs):
         start = time.process_time()
-        work()
+        _ = simulate(camera, shared=Shared()).render
         runs.append(time.process_time() - start)
     return statistics.median(runs)
