@@ -27,7 +27,7 @@ from vcam_cli.image_formation.optical_path import Layer, OpticalPath, SpectrumRe
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.warps import warped_layers
 from vcam_cli.parallel import each
-from vcam_cli.rng import blocks
+from vcam_cli.rng import runs_of_blocks
 from vcam_cli.scenes.base import View
 from vcam_cli.scenes.layered import AnyScene
 
@@ -38,6 +38,10 @@ CELL_ERROR = 0.5
 """Error of the means over a chart's cells where edges meet, relative to white, over the tolerance.
 As cells are finer than the blur, pixels err by 0.07 tolerances by it at most: measured on leaves
 and the still life from `draft` to `reference`, well exposed and ten times over."""
+
+AT_ONCE = 1 << 16
+"""Pixels whose light is gathered at once, at least: in blocks of 64 rows, a uniform chart on two
+columns took twice the time."""
 
 
 def view(
@@ -138,6 +142,7 @@ def _gathered(path: OpticalPath, scene: AnyScene, planes: bool) -> Rate:
     count = len(mosaic.colors) if planes else 1
     out: Array = np.zeros((count, g.rows, g.columns), path.settings.dtype)
     x, y = (axis.astype(out.dtype) for axis in pixel_centers(g))
+    blocks = runs_of_blocks(g.rows, AT_ONCE // g.columns)
     glares, gains = _glares_and_gains(path.effects)
     # The light has the gain of the axis in it: see `pixel_response.scene_transfer`.
     on_axis = {e: out.dtype.type(1 / (e.on_axis or 1.0)) for e in of_kind(path.effects, Gain)}
@@ -161,12 +166,12 @@ def _gathered(path: OpticalPath, scene: AnyScene, planes: bool) -> Rate:
         apply_gains(gains[0], block)
 
     for number, layer in enumerate(layers):
-        each(partial(add, layer, number == 0), blocks(g.rows), path.workers)
+        each(partial(add, layer, number == 0), blocks, path.workers)
         del layer  # its memory, before the next one is made
-    each(finish, blocks(g.rows), path.workers)
+    each(finish, blocks, path.workers)
     for glare, behind in zip(glares, gains[1:], strict=True):
         _spread(out, mosaic, glare)
-        each(partial(apply_gains, behind), blocks(g.rows), path.workers)
+        each(partial(apply_gains, behind), blocks, path.workers)
     return Rate(out if planes else out[0], LightPlan(), report)
 
 
