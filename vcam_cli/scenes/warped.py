@@ -55,6 +55,8 @@ AT_ONCE = 1 << 14
 """Places that are interpolated at once: 2 MB."""
 IN_CACHE = 64
 """Lines of a tile that are transposed at once: 0.2 MB."""
+SEEN = 160
+"""Places along a side of a tile of values: 320 took 165 MB before leaves."""
 POINTS = 4.0
 """Points of a chart along the distance of the nearest requested ones: between them its
 values are interpolated linearly."""
@@ -66,7 +68,7 @@ LOOKS, LOOKS_IN_TILE = 33, 5
 """Places along each side of a map, and of a tile, at which its scale is looked at."""
 TINY = 1e-30
 """Less than any second moment that counts."""
-SQUARES = 270
+SQUARES = 150
 """Temporary arrays for each cell whose squares are painted, as measured [bytes]."""
 CORNERS = ((-1, -1), (-1, 1), (1, -1), (1, 1))
 """Signs of the ways to four squares."""
@@ -401,8 +403,8 @@ class WarpedChart(Chart):
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the values (R, len(y), len(x)) at points, straight between closely spaced ones."""
         out = np.zeros((len(mix), len(y), len(x)), mix.dtype)
-        for rows in pieces(len(y), TILE):
-            for columns in pieces(len(x), TILE):
+        for rows in pieces(len(y), SEEN):
+            for columns in pieces(len(x), SEEN):
                 at = self.sees.on_grid(x[columns], y[rows])
                 out[:, rows, columns] = self._values(at, mix)
         return out
@@ -413,7 +415,7 @@ class WarpedChart(Chart):
         axes = []
         for axis, place in enumerate(at):
             along = np.abs(np.diff(place, axis=1 - axis)) if place.shape[1 - axis] > 1 else place
-            step = max(float(along.min()), np.ptp(place) / (POINTS * TILE), 1e-12) / POINTS
+            step = max(float(along.min()), np.ptp(place) / (POINTS * SEEN), 1e-12) / POINTS
             count = math.ceil(np.ptp(place) / step) + 2
             axes.append(place.min() - step + step * np.arange(count + 1))
         x, y = axes
