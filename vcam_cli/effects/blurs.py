@@ -10,6 +10,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import ClassVar
 
 import numpy as np
 
@@ -305,6 +306,9 @@ class PlaneTransfer(Blur):
     Complex where it is not symmetric about a point: H(-f) = conj(H(f)), with the sign of
     integral h(x, y) exp(-2 pi i (fx x + fy y)) dx dy, x to the right and y down.
     """
+
+    working_bytes: ClassVar[int] = 0
+    """Memory that it takes once while its harmonics are computed, for all places together."""
 
     def harmonics(self, frequency: Array, wavelengths: Array) -> Array:
         """Return the transfer as harmonics of the direction; `pupil_harmonics` defines them.

@@ -370,15 +370,23 @@ def _require_memory(solved: Solved) -> int:
     if solved.scene.moves or (lamp is not None and lamp.flicker is not None):
         samples *= 2  # each has a rate of its own
     scattered = array.rows * array.columns if layout.is_scattered else 0
-    judged = bool(solved.quality)
-    needed = memory_model.frame_bytes(
-        layout.lattice, solved.settings, colors, judged, samples, scattered, _edge_pixels(solved)
-    )
+    on_screen = 0
     if "s-cielab" in solved.quality:
         shape = layout.picture_shape
         screen = display_screen(solved.display, shape[1])
         # By one thread, which is all there are where memory is little.
-        needed += scielab.needed_bytes(shape, screen, solved.display.filters, 1)
+        on_screen = scielab.needed_bytes(shape, screen, solved.display.filters, 1)
+    needed = memory_model.frame_bytes(
+        layout.lattice,
+        solved.settings,
+        colors,
+        bool(solved.quality),
+        samples,
+        scattered,
+        _edge_pixels(solved),
+        bool(of_kind(solved.effects.enabled, Transport)),
+        on_screen,
+    )
     memory.require(needed, array.rows, array.columns)
     return needed
 

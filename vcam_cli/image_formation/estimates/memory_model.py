@@ -29,12 +29,18 @@ from vcam_cli.scenes.base import ChartScene, SampledScene
 BASE = 155_000_000
 """Interpreter and libraries of `vcam run`, 132 to 145 MB; a call of the library takes
 40 MB less [bytes]."""
+LATER = 15_000_000
+"""Libraries among them that are loaded behind the light: 132 to 136 MB are taken before a chart is
+painted [bytes]."""
 HALVES, DISPARITY = 100, 170
 """What codes of both halves of a pixel take, and writing them and their disparity beside other
 files [bytes]: 27 and 45 MB were measured for `dual-pixel`, beyond what its light takes."""
 COMPARED, COMPARED_COLOR = 35, 10
 """What comparing an image with the ideal one takes for a pixel, and for each of its colors besides
 [bytes]: 44.0 were measured of one color, 64.0 of three."""
+TRANSPORTED = 11
+"""Planes of a frame whose charge is transported: light, what is collected of it, what arrives, that
+of a full well, and what is added up of them, as measured for `eev-44-82`."""
 SLACK = 1.1
 """Memory of the process over what is in use: freed memory is not given back at once."""
 FEW_HARMONICS = 64
@@ -108,7 +114,7 @@ def image_bytes(
     filtering = round(SLACK * (held + pixels * width)) + work_bytes(
         pixels, path.workers, planes * colors
     )
-    return BASE + max(filtering, painted)
+    return BASE + max(filtering, painted - LATER)
 
 
 def device_bytes(path: OpticalPath, scene: SampledScene, highest: float, planes: int) -> int:
@@ -180,7 +186,7 @@ def table_bytes(path: OpticalPath, planes: int, size: TableSize) -> int:
     values = len(directed) * planes * colors + 4 * len(light)
     tables = 16 * ring_entries(path.field_rings, size) * values * harmonics
     of_field = round(SLACK * (tables + min(sum(grids), GRID_CACHE_BYTES + max(grids))))
-    return of_blurs + of_field
+    return of_blurs + of_field + max(blur.working_bytes for blur in directed)
 
 
 def _samples(path: OpticalPath, scene: SampledScene, highest: float, planes: int) -> int:
@@ -335,6 +341,8 @@ def frame_bytes(
     samples: int = 0,
     scattered: int = 0,
     edge: int = 0,
+    transported: bool = False,
+    screen: int = 0,
 ) -> int:
     """Return the memory of a frame without its scene: signal, raw, render, figures.
 
@@ -354,6 +362,10 @@ def frame_bytes(
         Pixels that fill no rows and columns and are interpolated on a grid.
     edge : int, optional
         Pixels that the response of a slanted edge is found from; 0 without one.
+    transported : bool, optional
+        Whether charge is transported through the array.
+    screen : int, optional
+        What S-CIELAB adds to the process beside the two images that it compares [bytes]; 0 without.
 
     Returns
     -------
@@ -363,11 +375,33 @@ def frame_bytes(
     pixels = geometry.rows * geometry.columns
     width = knobs.float_width // 8
     frame = pixels * (2 * width + 3 + colors)  # rate, electrons, codes, numbers of colors, render
-    # The SNR of the picture has its signal, a copy and a mask.
-    frame += max(pixels * (2 * width + 1), EDGE * edge)
+    # The SNR of the picture has its signal, a copy and a mask, before any image is compared.
+    figures = max(pixels * (2 * width + 1), EDGE * edge)
+    compared = comparison_bytes(pixels, colors) if judged else 0
+    if screen:
+        compared = max(compared, 2 * pixels * colors * width + round(screen / SLACK))
+    frame += max(figures, compared)
     if samples:  # their electrons and codes, the photocurrent and what is made into a picture
         frame += pixels * (samples * (width + 4) + 8)
     frame += SCATTERED * scattered
-    compared = (COMPARED + COMPARED_COLOR * colors) * pixels if judged else 0
-    held = max(pixels * width * (colors + 1), frame) + compared
+    light = pixels * width * max(colors + 1, TRANSPORTED if transported else 0)
+    held = max(light, frame)
     return BASE + round(SLACK * held) + work_bytes(pixels, 2)
+
+
+def comparison_bytes(pixels: int, colors: int) -> int:
+    """Return what comparing an image with the ideal one takes.
+
+    Parameters
+    ----------
+    pixels : int
+        Pixels of the array.
+    colors : int
+        Number of colors.
+
+    Returns
+    -------
+    int
+        Bytes, at least those measured.
+    """
+    return (COMPARED + COMPARED_COLOR * colors) * pixels
