@@ -42,6 +42,8 @@ LEAVES = (
     "output.render=none",
 )
 SMALL = ("array.rows=32", "array.columns=32", "output.render=none")
+SHIPPED = "eev-44-82", "12mp-bayer", "cfa-bayer", "csf-color-0.35um", "double-gauss", "fisheye"
+"""Cameras of transport, comparisons, leaves, colorimetry and lenses that distort."""
 IMPORTS = "numpy", "pydantic", "typer"
 BANDS = np.linspace(400e-9, 700e-9, 31)
 COMMANDS = {
@@ -129,12 +131,23 @@ def _small_sweep(repeats: int, points: int) -> dict[str, Row]:
 
             return run_cost(work)
 
-        one, other = take_turns(repeats, swept, looped)
+        def made() -> Cost:
+            shared = Shared()
+
+            def work() -> None:
+                for n in range(points):
+                    each = camera.with_({noise: f"{1 + n / points} e"})
+                    simulate(each, 1, shared=shared).metrics["snr_db"]
+
+            return run_cost(work)
+
+        one, other, making = take_turns(repeats, swept, looped, made)
 
         point = _traced(lambda: sweep_points.grid(sweep_file.read(study)).points) / points
     alone = _traced(lambda: [load("starter", SMALL) for _ in range(10)]) / 10
     return {
         "points": one.ratio(other) | {"before": 2.0},
+        "points, over a loop that makes its cameras": one.ratio(making),
         "memory of a point, over a camera": {"ratio": point / alone, "before": 1.0},
     }
 
@@ -200,6 +213,8 @@ def _forecasts() -> dict[str, Row]:
         sources |= {f"the chart {chart}": f"{{chart: {chart}}}" for chart in charts}
         out = folder / "out"
         found = {"layers of `table-top`": {"ratio": forecast_ratio("table-top", size, out)}}
+        for name in SHIPPED:
+            found[f"`{name}`"] = {"ratio": forecast_ratio(name, (), out)}
         for what, source in sources.items():
             camera, sets = "starter", (*size, f"scene.source={source}")
             if "cube" in what:  # it has light of its own

@@ -247,7 +247,7 @@ def geometry(camera: CameraModel) -> Geometry:
 
 
 _LAST: dict[str, tuple[tuple[object, ...], Geometry]] = {}
-"""The last geometry, and the sections that it was solved from: a frame asks for it 15 times."""
+"""The last geometry, and the sections that it was solved from: a frame requires it 15 times."""
 
 
 def _solved(camera: CameraModel) -> Geometry:
