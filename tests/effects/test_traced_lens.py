@@ -247,3 +247,16 @@ def test_further_frames_through_a_lens_share_its_tables():
     wider = "optics.prescription={use: double-gauss, scale: 0.0905, f_number: 5.6}"
     other = blur_of(camera(wider)).rings(5)[2].blur
     assert abs(other.harmonics(f, waves)[..., 0] - first.harmonics(f, waves)[..., 0]).max() > 1e-4
+
+
+def test_harmonics_of_rays_are_their_transfer_in_every_direction():
+    """At frequencies that begin anywhere, some of them beyond the end of the transfer."""
+    place = blur_of(camera("optics.diffraction=false")).at_heights(np.array([1e-3]))[0]
+    f, green = np.linspace(0.1, 20, 30) / place.reach, 550e-9
+    found = place.harmonics(f, np.array([green]))[0]
+    orders = np.arange(found.shape[1])
+    for angle in (0.0, 0.7, 2.1):
+        waves = found * np.exp(1j * orders * angle)
+        value = waves[:, ::2].real.sum(axis=1) + 1j * waves[:, 1::2].imag.sum(axis=1)
+        expected = place.otf_along(f, (math.cos(angle), math.sin(angle)), green)
+        np.testing.assert_allclose(value, expected, atol=1e-3)

@@ -168,15 +168,18 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
         at = np.minimum(frequency, self._end)
         count = math.ceil((self._end if self.diffracts else float(at.max())) / step) + STENCIL
         if not self.diffracts:
-            few, places = np.unique(at, return_inverse=True)
-            if len(few) < count // 2:
-                return self._direct_harmonics(few)[:, places]
-        key = self.wavefront.field, self.wavefront.place, self.diffracts, self.color, count
-        table = _HARMONICS.get(
-            (*key, self.shortest, self.longest),
-            lambda: self._direct_harmonics(step * np.arange(count)).astype(np.complex64),
+            inside = np.count_nonzero(frequency < self._end)
+            if inside < count // 2:
+                few = self._kept_harmonics(frequency[:inside]).astype(np.complex128)
+                return np.pad(few, ((0, 0), (0, len(frequency) - inside), (0, 0)))
+        return _between(self._kept_harmonics(step * np.arange(count)), at / step)
+
+    def _kept_harmonics(self, frequency: Array) -> Array:
+        key = self.wavefront.field, self.wavefront.place, self.diffracts, self.color
+        return _HARMONICS.get(
+            (*key, frequency.tobytes(), self.shortest, self.longest),
+            lambda: self._direct_harmonics(frequency).astype(np.complex64),
         )
-        return _between(table, at / step)
 
     @property
     def _end(self) -> float:
@@ -186,11 +189,17 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
         return min(self.wavefront.cutoff(self.shortest), rays) if self.diffracts else rays
 
     def _direct_harmonics(self, frequency: Array) -> Array:
+        """Return the harmonics (nodes, n, m) at frequencies (n,) in even steps."""
+
         def values(angles: Array) -> Array:
             # A wavefront even in y: H(pi - theta) is the conjugate of H(theta).
             half = angles[angles < (1 + 1e-9) * np.pi / 2]
-            fx, fy = (np.multiply.outer(frequency, along(half)) for along in (np.cos, np.sin))
-            found = np.array([self._at_node(fx, fy, node) for node in range(len(self._nodes))])
+            nodes = range(len(self._nodes))
+            if self.diffracts:
+                fx, fy = (np.multiply.outer(frequency, along(half)) for along in (np.cos, np.sin))
+                found = np.array([self._at_node(fx, fy, node) for node in nodes])
+            else:
+                found = np.array([self._along(frequency, half, node) for node in nodes])
             first = 1 if angles[0] == 0 else 0
             mirrored = found[..., first : first + len(angles) - len(half)]
             return np.concatenate([found, mirrored[..., ::-1].conj()], axis=-1)
@@ -283,6 +292,27 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
             turns = np.outer(fx.ravel()[some], x) + np.outer(fy.ravel()[some], y)
             out[some] = np.exp(-2j * np.pi * turns).mean(axis=1)
         return out.reshape(fx.shape)
+
+    def _along(self, frequency: Array, angles: Array, node: int) -> Array:
+        """Return what `_at_node` does by rays at frequencies (n,) in directions (d,): (n, d).
+
+        Frequencies lie in even steps. The wave of the one in place a s + b is the product of those
+        of two places: each ray has 2 sqrt(n) of them in place of n.
+        """
+        wavelength, count = 1 / float(self._nodes[node]), len(frequency)
+        x, y = self._landings(wavelength)
+        side = math.isqrt(max(count - 1, 0)) + 1
+        start, step = float(frequency[0]), float(np.ptp(frequency)) / max(count - 1, 1)
+        near, far = start + step * np.arange(side), step * side * np.arange(side)
+        found = np.empty((count, len(angles)), np.complex128)
+        for column, angle in enumerate(angles.tolist()):
+            turns = -2j * np.pi * (math.cos(angle) * x + math.sin(angle) * y)
+            waves = np.exp(np.outer(far, turns)) @ np.exp(np.outer(near, turns)).T
+            found[:, column] = waves.ravel()[:count] / len(x)
+        outwards = np.outer(frequency, np.cos(angles)) * self._shift(wavelength)
+        found *= np.exp(-2j * np.pi * outwards)
+        found[frequency >= self._blurred_out(wavelength)] = 0
+        return found
 
     def _landings(self, wavelength: float) -> tuple[Array, Array]:
         at = np.linspace(-1, 1, RAYS + 1)[:-1] + 1 / RAYS
