@@ -168,7 +168,7 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
         at = np.minimum(frequency, self._end)
         count = math.ceil((self._end if self.diffracts else float(at.max())) / step) + STENCIL
         if not self.diffracts:
-            inside = np.count_nonzero(frequency < self._end)
+            inside = int(np.count_nonzero(frequency < self._end))
             if inside < count // 2:
                 few = self._kept_harmonics(frequency[:inside]).astype(np.complex128)
                 return np.pad(few, ((0, 0), (0, len(frequency) - inside), (0, 0)))
