@@ -73,7 +73,7 @@ class FixedPattern(NoiseSource):
     @property
     def pixel_seconds(self) -> float:
         """Time of one pixel with what this camera's numbers call for [core seconds]."""
-        drawn = sum(getattr(self, part) > 0 for part in self.parts)
+        drawn = sum(part > 0 for part in (self.offset_pixel, self.gain_pixel, self.dark))
         return DRAW * drawn + DEFECTS * (self.hot > 0 or self.dead > 0)
 
     def __post_init__(self) -> None:

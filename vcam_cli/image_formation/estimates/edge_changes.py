@@ -226,10 +226,10 @@ def _waves(parts: Array, f: Array, places: Array) -> Array:
     step, count = 2 * f[0], scipy.fft.next_fast_len(FINER * len(f))
     if len(places) < count:
         angle = 2 * np.pi * np.multiply.outer(f, places)
-        sines = product(np.ascontiguousarray(parts.real), np.sin(angle))
-        if np.isrealobj(parts):
-            return step * sines
-        return step * (sines + product(np.ascontiguousarray(parts.imag), np.cos(angle)))
+        waves: Array = step * product(np.ascontiguousarray(parts.real), np.sin(angle))
+        if np.iscomplexobj(parts):
+            waves += step * product(np.ascontiguousarray(parts.imag), np.cos(angle))
+        return waves
     number = np.arange(count) - count // 2
     spectrum = np.zeros((len(parts), count), complex)
     spectrum[:, : len(f)] = parts * step
