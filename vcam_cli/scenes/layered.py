@@ -48,6 +48,7 @@ class MaskedChart(Chart):
     """0 where there is nothing."""
 
     edge_seconds = property(lambda self: self.light.edge_seconds)
+    undivided = property(lambda self: self.light.undivided)
     cell_bytes = property(lambda self: self.light.cell_bytes)
 
     @property

@@ -39,18 +39,22 @@ LAYERS = 5.0
 """Mean number of leaves over a point; exp(-5) of the ground shows."""
 PERIOD = 1.5
 """Distance after which the leaves repeat, in units of the frame's longer side."""
-FINEST = 1000
+UNDIVIDED = 600
 """Cells a side that are painted directly, at least. Where many leaves share a cell, telling which
-is seen where takes time and gigabytes: larger cells are divided."""
+is seen where takes time and gigabytes: larger cells are divided. With 1000, eight layers of leaves
+took 1.3 times as long in a first frame."""
+FINEST = 1000
+"""Cells a side of the sums over one period. Wider cells err more, in proportion: by 0.68, 1.01 and
+1.47 of what 0.4, 0.6 and 0.8 of the smallest leaf's radius were asked to, undivided."""
 AT_ONCE = 1 << 18
 """Cells that are painted at once where many leaves are seen: bounds the memory of temporaries."""
 KEPT_CELLS = 1 << 22
 """Cells of a picture, parts counted, up to which their visible leaves are kept for other lenses. Of
 more, the last bands of a picture would drop its first."""
 SUMMED, SUMMED_FAR = 32, 4
-"""Parts along each side of a cell above which its average is read from sums over one period, of
-cells within and beyond one. Their edges then fall between those of the parts: of white, an rms of
-6e-5 in single cells, and of 1e-3 in those beyond, which lenses blur by the hundred."""
+"""Finest cells along each side of a cell above which its average is read from sums over one
+period, of cells within and beyond one. Their edges then fall between those of the parts: of white,
+an rms of 6e-5 in single cells, and of 1e-3 in those beyond, which lenses blur by the hundred."""
 EDGE_SECONDS = 0.035, 0.0135
 """Core seconds to find the edges that a frame sees, and more for each division of cells,
 calibrated."""
@@ -253,8 +257,8 @@ class DeadLeaves(Chart):
     whole grid is known."""
     divided = property(lambda self: divisions(self.cell_error))
     edge_seconds = property(lambda self: EDGE_SECONDS[0] + EDGE_SECONDS[1] * self.divided)
-    cell_bytes = 84  # 12 to 84 were measured, most where a band sees half of the leaves of a frame
-    undivided = property(lambda self: self.unit / FINEST)
+    cell_bytes = 110  # 12 to 110 were measured, most where a band sees half of the leaves of a frame
+    undivided = property(lambda self: self.unit / UNDIVIDED)
 
     def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
         """Return the energy of leaves anywhere."""
@@ -308,7 +312,7 @@ class DeadLeaves(Chart):
             self._placed_leaves(x_edges, y_edges).paint(x_edges, y_edges, mix, out, hidden)
             return
         far = max(float(edges[-1] - edges[0]) for edges in (x_edges, y_edges)) > PERIOD * self.unit
-        if parts >= (SUMMED_FAR if far else SUMMED):
+        if self._parts(x_edges, y_edges, FINEST) >= (SUMMED_FAR if far else SUMMED):
             known = _period_cells(self.seed, tuple(map(tuple, mix.tolist())), mix.dtype)
             for plane, cells in zip(out, known, strict=True):
                 rows = _periodic_averages(cells, y_edges / self.unit, 0)
@@ -332,10 +336,10 @@ class DeadLeaves(Chart):
         order = np.argsort(at, kind="stable")
         return at[order], np.argsort(order)
 
-    def _parts(self, x_edges: Array, y_edges: Array) -> int:
-        """Return into how many parts along each side cells are divided."""
+    def _parts(self, x_edges: Array, y_edges: Array, count: int = UNDIVIDED) -> int:
+        """Return into how many parts along each side cells are divided, `count` of them a side."""
         largest = max(float(np.diff(edges).max()) for edges in (x_edges, y_edges))
-        return max(1, math.ceil(largest / self.unit * FINEST * (1 - 1e-9)))
+        return max(1, math.ceil(largest / self.unit * count * (1 - 1e-9)))
 
     def _paint_parts(
         self, parts: int, x_edges: Array, y_edges: Array, mix: Array, out: Array
@@ -353,7 +357,7 @@ class DeadLeaves(Chart):
             make = partial(each._covered, x, y, parts)
             if self.keep:
                 make = partial(
-                    discs.painted_once, (x, y), (self.seed, self.unit, each.divided), make
+                    discs.painted_once, (x, y), (self.seed, self.unit, each.cell_error), make
                 )
             cells[:] = make().averages(mix)
 
@@ -362,7 +366,7 @@ class DeadLeaves(Chart):
         laid = replace(self, keep=False).crop_to_cells(x_edges, y_edges)
         assert isinstance(laid, PlacedLeaves)
         x, y = x_edges / self.unit, y_edges / self.unit
-        found = discs.coverage(laid.leaves.discs, x, y, None, self.divided).together(parts)
+        found = discs.coverage(laid.leaves.discs, x, y, None, laid.divided).together(parts)
         near = replace(found, near=np.arange(len(found.near)))
         return CoveredCells(laid.leaves.select(found.near), near)
 
@@ -370,7 +374,9 @@ class DeadLeaves(Chart):
         left, right, top, bottom = (end / self.unit for end in (x[0], x[-1], y[0], y[-1]))
         leaves = generate_leaves(self.seed)
         copies = _periodic_copies(leaves, left, right, top, bottom)
-        return PlacedLeaves(copies, self.unit, self.divided, bool(self.keep))
+        wide = max(float(np.diff(at).max()) for at in (x, y)) / self.unit * FINEST
+        divided = divisions(self.cell_error / max(wide, 1.0))
+        return PlacedLeaves(copies, self.unit, divided, bool(self.keep))
 
 
 def _divided(edges: Array, parts: int) -> Array:
