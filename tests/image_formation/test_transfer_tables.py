@@ -294,3 +294,26 @@ def test_mixtures_err_as_stated_between_the_frequencies_at_which_they_are_judged
     rebuilt = np.tensordot(mix.T, exact.with_mixtures(mix).radial_response(f), axes=1)
     lost = np.abs(rebuilt - exact.radial_response(f)).max() / exact.level.max()
     assert error <= lost * (1 + 1e-9) <= 1.02 * error
+
+
+def test_components_without_a_common_color_are_not_mixed():
+    """Two colors see the first three components, a third one the fourth, and none the last."""
+    wavelengths = np.linspace(450e-9, 650e-9, 5)
+    weights = np.zeros((5, 3, 5))
+    weights[:3, :2] = np.random.default_rng(2).random((3, 2, 5))
+    weights[2, :2] = weights[0, :2] + weights[1, :2]
+    weights[3, 2] = 1.0
+    exact = light(Diffraction(2.8, 0.0), weights=weights, wavelengths=wavelengths)
+    size = TableSize(3e5, 257, 1e-6, 8)
+    mix, error = mixtures(exact, size)
+    assert len(mix) == 3
+    assert error <= 1e-6
+    alone = mix[:, 3] != 0
+    assert alone.sum() == 1
+    np.testing.assert_array_equal(mix[alone], [[0, 0, 0, 1, 0]])
+    assert not mix[:, 4].any()
+    seen = tabulate(exact, size, (mix, error)).planes_by_color
+    assert [(list(~alone[planes]), colors) for planes, colors in seen] == [
+        ([True, True], slice(0, 2)),
+        ([False], slice(2, 3)),
+    ]
