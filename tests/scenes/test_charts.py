@@ -1,6 +1,7 @@
 """Every chart: averages are averages of its point values; and each chart's own geometry."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -150,6 +151,8 @@ def test_workers_do_not_change_a_byte(source, monkeypatch):
 def test_leaves_that_are_left_out_would_not_be_seen(source):
     # Cells fine enough that leaves are looked through first; rounding of sums in another order.
     chart = sampled(source, rows=120, columns=160, oversampling=7, margin=3)
+    if source is LEAVES:  # those that are kept for other lenses are found as they are painted
+        chart = replace(chart, chart=replace(chart.chart, keep=False))
     mix = mix_of(chart)
     x, y = (cell_edges(n, 3e-6 / 7) for n in chart.shape[::-1])
     seen = chart.chart.crop_to_cells(x, y)
