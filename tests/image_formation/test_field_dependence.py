@@ -7,11 +7,14 @@ import numpy as np
 import pytest
 from optical_paths import PITCH, aperture, light, of_picture, path, rms, sensor, signal
 
+from vcam_cli import load, simulate
+from vcam_cli.effects.optics import field_blur
 from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.effects.optics.field_blur import FieldBlur
 from vcam_cli.effects.optics.low_pass import LowPassAlongAxes, ObliqueLowPass
 from vcam_cli.effects.optics.wavefront_blur import DirectedBlur, Lens
 from vcam_cli.image_formation.settings import DRAFT, REFERENCE, STANDARD
+from vcam_cli.simulation.shared import Shared
 
 WAVELENGTHS = (480e-9, 620e-9)
 LENS = Lens(4.0, True)
@@ -133,3 +136,19 @@ def test_a_filter_that_doubles_the_image_acts_beside_a_field(filter_kind, plates
     found = through(field, filter_kind(plates), knobs=replace(REFERENCE, tolerance=0.0005))
     assert rms(found, expected) <= 0.0005
     assert rms(expected, by_own_wavefronts(field)) > 0.01
+
+
+def test_what_too_few_places_err_by_is_stated(monkeypatch):
+    """Defocus grows by half a wave to the corner: three places do not follow it, nine do."""
+    sets = ["array.rows=24", "array.columns=32", "quality=[]", "accuracy=draft"]
+    sets += ["optics.zernike=[{field: 0, 4: 0 um}, {field: 1, 4: 0.3 um}]"]
+    sets += ["effects={aberration: on}", "scene.source={kind: chart, chart: slanted-edge}"]
+
+    def frame(most):
+        monkeypatch.setattr(field_blur, "MAX_PLACES", most)
+        return simulate(load("starter", sets), workers=1, shared=Shared()).frame
+
+    few, enough = frame(3), frame(33)
+    error = rms(few.rate - enough.rate)
+    assert 0 < error < few.spectrum.lost_rms
+    assert enough.spectrum.lost_rms < 0.1 * few.spectrum.lost_rms

@@ -397,6 +397,21 @@ class FieldTransfer(Effect):
         """
         return self.rings(count)
 
+    def place_error(self, count: int) -> float:
+        """Return what the transfer errs by between places, where there are fewer than needed.
+
+        Parameters
+        ----------
+        count : int
+            Number of places from center to corner, as in `rings`.
+
+        Returns
+        -------
+        float
+            Bound on the error of a transfer function; 0 where there are as many as needed.
+        """
+        return 0.0
+
     @property
     def table_seconds(self) -> float:
         """Core seconds of what its transfers are looked up in, made once."""

@@ -127,8 +127,16 @@ def photo_rate(path: OpticalPath, scene: AnyScene, planes: bool = False) -> Rate
         lost = found.spectrum.lost_rms * math.sqrt(path.scatter)
         error = math.hypot(lost, plan.share * full)
         if full >= path.full or error <= USED_SHARE * path.settings.tolerance * full:
-            return replace(found, plan=plan)
+            return replace(found, plan=plan, spectrum=_with_place_error(path, found.spectrum))
         path = replace(path, full=full)
+
+
+def _with_place_error(path: OpticalPath, report: SpectrumReport) -> SpectrumReport:
+    """Return the report with what a blur of the field errs by between its places."""
+    count = path.settings.field_zones
+    error = path.field.place_error(count) if path.field else 0.0
+    # detail is at most half as strong as light from 0 to the peak
+    return replace(report, lost_rms=math.hypot(report.lost_rms, error * report.peak / 2))
 
 
 def _gathered(path: OpticalPath, scene: AnyScene, planes: bool) -> Rate:

@@ -35,9 +35,9 @@ from vcam_cli.physics.zernike import Terms
 TYPICAL_CHANGE = 0.1
 """Change of a wavefront from center to corner [waves rms] for which the settings' number of places
 is meant. Of other changes as many places are taken as err as little: see `places_needed`."""
-MAX_PLACES = 13
-"""Number of places on a stretch at which that ends: of a wavefront of more waves what lies between
-two zones is known less well."""
+MAX_PLACES = 33
+"""Number of places on a stretch at which that ends; what more waves err by between them is stated.
+With 13, defocus that grew by 1.2 and 2 um erred by 0.06 and 0.15 % of full signal."""
 
 
 @dataclass(frozen=True)
@@ -175,6 +175,13 @@ class FieldBlur(AberrationBlur, FieldTransfer):
             found.append((low, *inner, high))
         return tuple(found)
 
+    def place_error(self, count: int) -> float:
+        """Return what it errs by between places, where a stretch has more waves than they serve."""
+        allowed = interpolation_error(TYPICAL_CHANGE, max(count, 2))
+        waves = [change / GREEN for *_, change in self._changes]
+        worst = max(interpolation_error(w, places_needed(w, count)) for w in waves)
+        return min(worst, 1.0) if worst > allowed else 0.0
+
     def mean_error(self, signal: SignalLevels) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         # Wavefronts change evenly in between: none is worse than that of one of its ends.
@@ -183,9 +190,6 @@ class FieldBlur(AberrationBlur, FieldTransfer):
 
 def places_needed(change: float, count: int) -> int:
     """Return the places between which an even change of the wavefront is interpolated well enough.
-
-    Along a stretch the transfer function turns like exp(i t theta), t from 0 to 1, by about twice
-    the phase of the change. A polynomial through n Chebyshev points errs by 2 (theta / 4)^n / n!.
 
     Parameters
     ----------
@@ -199,13 +203,30 @@ def places_needed(change: float, count: int) -> int:
     int
         Number of places, 2 to the larger of `MAX_PLACES` and `count`.
     """
-
-    def error(waves: float, places: int) -> float:
-        return (math.pi * waves) ** places / math.factorial(places)
-
     count = max(count, 2)
-    most, allowed = max(MAX_PLACES, count), error(TYPICAL_CHANGE, count)
-    return next((n for n in range(2, most) if error(change, n) <= allowed), most)
+    most, allowed = max(MAX_PLACES, count), interpolation_error(TYPICAL_CHANGE, count)
+    return next((n for n in range(2, most) if interpolation_error(change, n) <= allowed), most)
+
+
+def interpolation_error(change: float, places: int) -> float:
+    """Return the error of a transfer function between places of a stretch.
+
+    Along it the transfer function turns like exp(i t theta), t from 0 to 1, by about twice the
+    phase of the change. A polynomial through n Chebyshev points errs by 2 (theta / 4)^n / n!.
+
+    Parameters
+    ----------
+    change : float
+        Change of the wavefront along the stretch [waves rms].
+    places : int
+        Number of places, its ends among them.
+
+    Returns
+    -------
+    float
+        Error without unit.
+    """
+    return 2 * (math.pi * change) ** places / math.factorial(places)
 
 
 @dataclass(frozen=True)

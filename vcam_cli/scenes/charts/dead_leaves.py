@@ -257,7 +257,9 @@ class DeadLeaves(Chart):
     whole grid is known."""
     divided = property(lambda self: divisions(self.cell_error))
     edge_seconds = property(lambda self: EDGE_SECONDS[0] + EDGE_SECONDS[1] * self.divided)
-    cell_bytes = 110  # 12 to 110 were measured, most where a band sees half of the leaves of a frame
+    cell_bytes = (
+        110  # 12 to 110 were measured, most where a band sees half of the leaves of a frame
+    )
     undivided = property(lambda self: self.unit / UNDIVIDED)
 
     def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
