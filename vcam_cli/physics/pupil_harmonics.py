@@ -67,7 +67,8 @@ class PupilHarmonics:
         series = np.tensordot(lagrange(self.wavenumbers, 1 / wavelength), self.series, axes=1)
         inside = h < 1
         at = np.polynomial.chebyshev.chebvander(2 * np.where(inside, h, 0.0) - 1, len(series) - 1)
-        return np.asarray((at * inside[:, None]) @ series)
+        parts = np.ascontiguousarray(series).view(np.float64)  # a real product takes a third
+        return ((at * inside[:, None]) @ parts).view(np.complex128)
 
 
 def pupil_harmonics(terms: Terms, wavelengths: Array, slope: float) -> PupilHarmonics:
