@@ -40,6 +40,9 @@ from vcam_cli.image_formation.transfer_tables import (
 
 PLACES = 97
 """Points of a map along each side of the sensor; between them it is straight."""
+LEFT_ALONG = 1e-3
+"""Rms error of a ring's transfer along one direction, by the modes that are left out, relative to
+the level: what edges change errs by 0.2 % of itself, and by 0.7 % with four times as much."""
 JUDGED_HERE = 33
 """Frequencies at which mixtures of spectra are judged in some rings."""
 
@@ -58,11 +61,37 @@ class Map:
 
         They have the type of x.
         """
-        last = PLACES - 1
-        along_y = np.clip((y / self.half_height + 1) * (last / 2), 0, last)
-        along_x = np.clip((x / self.half_width + 1) * (last / 2), 0, last)
-        rows = _linear(self.values, along_y).astype(x.dtype)
-        return _linear(rows.T, along_x).T
+        rows = linear(self.values, map_position(y, self.half_height)).astype(x.dtype)
+        return linear(rows.T, map_position(x, self.half_width)).T
+
+    def along(self, places: Array, in_rows: bool) -> Array:
+        """Return the map's own rows at places x, or its columns at places y: (PLACES, places).
+
+        Parameters
+        ----------
+        places : Array
+            Places (n,) [m].
+        in_rows : bool
+            Whether they lie along x.
+
+        Returns
+        -------
+        Array
+            Values; between rows they are straight.
+        """
+        half = self.half_width if in_rows else self.half_height
+        return linear(self.values.T if in_rows else self.values, map_position(places, half)).T
+
+    def at(self, x: Array, y: Array) -> Array:
+        """Return the values at points x, y of one shape [m]."""
+        column, row = map_position(x, self.half_width), map_position(y, self.half_height)
+        left, above = (np.minimum(a.astype(int), PLACES - 2) for a in (column, row))
+        right, below = column - left, row - above
+        upper, lower = (
+            self.values[line, left] * (1 - right) + self.values[line, left + 1] * right
+            for line in (above, above + 1)
+        )
+        return np.asarray(upper * (1 - below) + lower * below)
 
     @property
     def azimuth(self) -> Array:
@@ -76,8 +105,40 @@ class Map:
         return float(np.mean(self.values**2))
 
 
-def _linear(values: Array, position: Array) -> Array:
-    """Return rows of a table at positions between them (n,), by linear interpolation."""
+def map_position(place: Array, half: float) -> Array:
+    """Return where places lie along a side of a map, from 0 to PLACES - 1.
+
+    Parameters
+    ----------
+    place : Array
+        Distances from the middle, of any shape [m].
+    half : float
+        Half the side [m].
+
+    Returns
+    -------
+    Array
+        Positions, in the shape and type of `place`.
+    """
+    last = PLACES - 1
+    return np.clip((place / half + 1) * (last / 2), 0, last)
+
+
+def linear(values: Array, position: Array) -> Array:
+    """Return rows of a table at positions between them, by linear interpolation.
+
+    Parameters
+    ----------
+    values : Array
+        Table (rows, columns).
+    position : Array
+        Positions (n,), from 0 to the last row.
+
+    Returns
+    -------
+    Array
+        Rows (n, columns).
+    """
     index = np.minimum(position.astype(int), len(values) - 2)
     part = (position - index).astype(values.dtype)[:, None]
     return np.asarray(values[index] * (1 - part) + values[index + 1] * part)
@@ -203,6 +264,60 @@ def tabulate_field(
         ]
     mean = _resampled(np.mean([change[0].real for change in changes], axis=0), base.shape[-1])
     return table(base + mean), tuple(modes)
+
+
+def field_along(
+    light: Transfer,
+    rings: Sequence[Zone],
+    geometry: Geometry,
+    frequency: Array,
+    across: tuple[float, float],
+) -> list[tuple[Array, Map | None]]:
+    """Return what a blur that changes over the field adds to waves in one direction, by place.
+
+    Parameters
+    ----------
+    light : Transfer
+        Light of one component.
+    rings : sequence of Zone
+        The blur on the half-axis to the right.
+    geometry : Geometry
+        Geometry of the array.
+    frequency : Array
+        Spatial frequencies (n,), rising [cycles/m].
+    across : tuple of float
+        Unit vector (x, y) along which the waves change.
+
+    Returns
+    -------
+    list of tuple
+        Changes of the transfer (C, n), whose sum over all is that at a place [e/s], and the map of
+        the weight of each; None for 1.
+    """
+    top = float(frequency[-1])
+    coarse = np.linspace(0, top, len(frequency))
+    without = light.with_effects(())
+    changes = [_change(without, ring.blur, coarse) for ring in rings]
+    families, _ = _families(changes, LEFT_ALONG * float(np.abs(light.level).max()))
+    maps = zone_maps(rings, geometry)
+    weights, azimuth = np.array([m.values for m in maps]), maps[0].azimuth
+    direction = math.atan2(across[1], across[0])
+
+    def at_frequencies(table: Array) -> Array:
+        return _between(table[0], frequency / top * (len(coarse) - 1))
+
+    mean = np.mean([change[0].real for change in changes], axis=0)
+    found: list[tuple[Array, Map | None]] = [(at_frequencies(mean), None)]
+    for family, share in families:
+        angle = family.order * direction
+        turned = sum(
+            (math.sin(angle) if is_sine else math.cos(angle)) * part
+            for is_sine, part in family.turned(azimuth)
+        )
+        table = at_frequencies(family.table(changes, share)) * (1j if family.order % 2 else 1)
+        around = np.tensordot(share, weights, 1) * turned
+        found.append((table, replace(maps[0], values=around)))
+    return found
 
 
 def ring_entries(rings: Sequence[Zone], size: TableSize) -> int:
@@ -353,7 +468,12 @@ def _resampled(table: Array, entries: int) -> Array:
     count = table.shape[-1]
     if count == entries:
         return table
-    at = np.linspace(0, count - 1, entries)
+    return _between(table, np.linspace(0, count - 1, entries))
+
+
+def _between(table: Array, at: Array) -> Array:
+    """Return a table (..., n) at positions between its entries, by cubics through four of them."""
+    count = table.shape[-1]
     first = np.clip(at.astype(int) - 1, 0, count - 4)
     t = at - first - 1
     weights = (

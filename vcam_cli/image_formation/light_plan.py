@@ -32,7 +32,7 @@ from vcam_cli.image_formation.estimates.edge_changes import exact_changes, has_s
 from vcam_cli.image_formation.estimates.light_cost import LightCost
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.scenes.base import ChartScene
-from vcam_cli.scenes.blur_change import BlurLoss
+from vcam_cli.scenes.blur_change import BlurLoss, ChangeBounds
 from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.layered import AnyScene, LayeredScene
 from vcam_cli.scenes.waves import WaveScene
@@ -51,11 +51,12 @@ BLURS = (Blur, SeparableTransfer, FieldTransfer, Warp)
 """Kinds of effects that blur the light, or displace it."""
 KINDS = (*BLURS, Gain, VeilingGlare, NeighborSharing, ColumnSpread, Transport)
 """Kinds of effects on the light, and on the charge that it makes."""
-EXACT = 10e-3
-"""Time that exact sums take of what a blur changes of edges [s]: one that saves less is kept
-instead. Beside a blur that changes over the field, which has the larger tables, none saves more."""
-LOOSEST = 8.0
-"""Bounds over exact sums, at most, of edges that lie anywhere to the pixels: larger ones stay."""
+EXACT, EXACT_OVER_FIELD = 10e-3, 50e-3
+"""Time that exact sums take of what a blur changes of edges, and one that changes over the field
+[s]: one that saves less is kept instead."""
+LOOSEST, LOOSEST_OVER_FIELD = 8.0, 24.0
+"""Bounds over exact sums, at most, of edges that lie anywhere to the pixels: larger ones stay. Of
+blurs over the field the bounds are those of the steepest wavefront everywhere."""
 MOST_TRIED = 10
 """Number of effects up to which all subsets are tried; beyond it, those that change least."""
 
@@ -174,14 +175,40 @@ def _blur_shares(cost: LightCost, budget: float) -> dict[Effect, float]:
     flat = scene.flat if isinstance(scene, LayeredScene | DepthScene) else scene
     bounds = flat.change_bounds(list(losses.values()), path.geometry, path.ceiling, budget)
     shares: dict[Effect, float] = dict(zip(losses, bounds.shares(), strict=True))
-    if has_straight_edges(flat) and not path.field:
-        loose = [e for e in of_kind(shares, Blur) if budget < shares[e] <= LOOSEST * budget]
-        open_ones = [e for e in loose if cost.saved((e,)) > EXACT]
-        exact = exact_changes(path, flat, open_ones) if open_ones else {}
-        shares |= {blur: change / bounds.full for blur, change in exact.items()}
+    if has_straight_edges(flat):
+        shares |= _edge_shares(cost, flat, losses, bounds, budget)
     # Points in place of averages alias what detail there is: only of even light is that nothing.
     detailed = [e for e in of_kind(shares, PixelAperture) if shares[e] > 0]
     return shares | dict.fromkeys(detailed, math.inf)
+
+
+def _edge_shares(
+    cost: LightCost,
+    scene: ChartScene,
+    losses: Mapping[Effect, BlurLoss],
+    bounds: ChangeBounds,
+    budget: float,
+) -> dict[Effect, float]:
+    """Return what blurs change of straight edges, summed exactly where that may pay.
+
+    Beside a blur over the field that stays, no other one saves as much as its sum takes.
+    """
+    path, found = cost.path, dict(zip(losses, bounds.shares(), strict=True))
+    exact: dict[Effect, float] = {}
+    for over_field in of_kind(losses, FieldTransfer):
+        even = replace(losses[over_field], is_uniform=True)
+        guess = scene.change_bounds([even], path.geometry, path.ceiling, budget).changes[0]
+        worth_it = guess <= LOOSEST_OVER_FIELD * budget * bounds.full
+        if not (worth_it and cost.saved((over_field,)) > EXACT_OVER_FIELD):
+            return {}
+        exact |= exact_changes(path, scene, [over_field])
+        if exact.get(over_field, math.inf) > budget * bounds.full:
+            return {}
+        others = path.with_effects([e for e in path.effects if e is not over_field])
+        cost = LightCost(others, cost.scene)
+    loose = [e for e in of_kind(found, Blur) if budget < found[e] <= LOOSEST * budget]
+    exact |= exact_changes(path, scene, [e for e in loose if cost.saved((e,)) > EXACT])
+    return {blur: change / bounds.full for blur, change in exact.items()}
 
 
 def _spread_light(weights: Array, spread: Array) -> tuple[Array, Array]:
@@ -258,6 +285,9 @@ def _best_set(
     def worth(omitted: tuple[Effect, ...]) -> tuple[float, int, float]:
         return round(cost.saved(omitted), 6), len(omitted), -sum(shares[e] for e in omitted)
 
-    sets = (s for n in range(len(small) + 1) for s in combinations(small, n))
+    # Without a blur over the field the light takes a fraction of the time: it goes first.
+    first = of_kind(small, FieldTransfer)
+    others = [e for e in small if e not in first]
+    sets = ((*first, *s) for n in range(len(others) + 1) for s in combinations(others, n))
     within = (s for s in sets if sum(shares[e] for e in s) <= budget)
     return max(within, key=worth)

@@ -7,7 +7,8 @@ the photodetector a blur H takes from an edge of height 1 at u = 0
     e(u) = (1 - h) (B(u) - 1/2) - integral_0^F Im[(H(f) - h) A(f) exp(2 pi i f u)] / (pi f) df,
 
 B the part of the photodetector beyond the edge, A its transfer, h = H(F) the value of H at the
-end of the integral.
+end of the integral. It is linear in 1 - H, and so a blur that changes over the field takes the sum
+of what few blurs take, each with its weight at the pixel (`field_dependence.field_along`).
 """
 
 from __future__ import annotations
@@ -22,7 +23,9 @@ import scipy.fft
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import pixel_centers
-from vcam_cli.effects.blurs import Blur
+from vcam_cli.effects.base import Effect, of_kind
+from vcam_cli.effects.blurs import Blur, FieldTransfer
+from vcam_cli.image_formation.field_dependence import Map, field_along, linear, map_position
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.parallel import product
 from vcam_cli.scenes.base import ChartScene, Scene
@@ -34,7 +37,9 @@ the result by 1e-4 of itself, and save next to no time."""
 AROUND = 8.0
 """Distance from an edge within which pixels count [pixel pitches, and spreads of the blur]: those
 further away are less than 0.5 % of what changes, 1 to 2 % with half of it."""
-
+SAME = 1e-3
+"""Distance within which all rows, or all columns, see edges in the same place [pixel pitches]: it
+moves the light of pixels beside them by as much of an edge's height at most."""
 
 FINER = 16
 """Places of a table over the frequencies that make it: straight lines err by 2 % of the
@@ -55,6 +60,8 @@ class EdgeGroup:
     """(n, m) numbers of these pixels in a strip."""
     counts: Array
     """(strips,) number of pixels that each represents."""
+    in_rows: bool = True
+    """Whether pixels are numbered along rows; along columns else."""
 
 
 def has_straight_edges(scene: Scene) -> TypeGuard[ChartScene]:
@@ -77,7 +84,9 @@ def has_straight_edges(scene: Scene) -> TypeGuard[ChartScene]:
     return scene.has_rectangles and not scene.discs(np.zeros((1, len(scene.spectra))))
 
 
-def exact_changes(path: OpticalPath, scene: ChartScene, blurs: Sequence[Blur]) -> dict[Blur, float]:
+def exact_changes(
+    path: OpticalPath, scene: ChartScene, blurs: Sequence[Blur | FieldTransfer]
+) -> dict[Effect, float]:
     """Return the rms change of the array by each of some blurs, as if it were the only one.
 
     Corners count as if their edges went on.
@@ -88,21 +97,24 @@ def exact_changes(path: OpticalPath, scene: ChartScene, blurs: Sequence[Blur]) -
         Lens and pixels.
     scene : ChartScene
         Chart of even light between straight edges.
-    blurs : sequence of Blur
+    blurs : sequence of Blur or FieldTransfer
         The blurs.
 
     Returns
     -------
     dict
-        Blur -> rms change in the color of most [e/s]; those whose transfer along one direction is
-        not known by itself are missing.
+        Blur -> rms change in the color of most [e/s]; missing are those whose transfer along one
+        direction is not known by itself, and those that change over the field before a chart
+        without a profile.
     """
-    found: dict[Blur, float] = {}
+    found: dict[Effect, float] = {}
     pixels = path.geometry.rows * path.geometry.columns
     for blur in blurs:
-        spread = float(blur.spread(path.transfer.wavelengths).max())
+        spread = blur.spread(path.transfer.wavelengths)
+        if spread is None or (blur is path.field and scene.chart.profile() is None):
+            continue
         squares = np.zeros(len(path.mosaic.colors))
-        for group in _groups(path, scene, spread):
+        for group in _groups(path, scene, float(spread.max())):
             own = _group_squares(path, group, blur)
             if own is None:
                 break
@@ -161,60 +173,128 @@ def _along_profile(
     heights: Array,
     spread: float,
 ) -> EdgeGroup:
-    """Return edges that are seen by all rows of pixels, or all columns, each in another place."""
+    """Return edges that are seen by all rows of pixels, or all columns, each in another place.
+
+    Where they see them in the same place, one strip represents all.
+    """
     x, y = pixel_centers(path.geometry, detector=True)
     steep = abs(across[0]) >= abs(across[1])
     at, lines = (x, y) if steep else (y, x)
     over, beside = across if steep else across[::-1]
+    reach = _reach(path, spread) / abs(over)
+    if abs(beside) * np.ptp(lines) < SAME * path.geometry.pitch_x:
+        distances, index = _near(at, places / over, reach)
+        count = np.full(1, len(lines))
+        return EdgeGroup(across, heights, over * distances, index, count, steep)
     # Where an edge crosses a line, and from there along the line.
     crossed = (places[:, None] - beside * lines) / over
-    reach = _reach(path, spread) / abs(over)
     distances, index = _near(at, crossed.ravel(), reach)
     shape = len(places), -1
     number = index + len(at) * np.tile(np.arange(len(lines)), len(places))[:, None]
     return EdgeGroup(
-        across, heights, (over * distances).reshape(shape), number.reshape(shape), np.ones(1, int)
+        across,
+        heights,
+        (over * distances).reshape(shape),
+        number.reshape(shape),
+        np.ones(1, int),
+        steep,
     )
 
 
-def _group_squares(path: OpticalPath, group: EdgeGroup, blur: Blur) -> Array | None:
+def _group_squares(path: OpticalPath, group: EdgeGroup, blur: Blur | FieldTransfer) -> Array | None:
     """Return the sums (C,) over pixels of the squared change by a blur [(e/s)^2]."""
     g, weights = path.geometry, path.transfer.weights
     reach = float(np.abs(group.distances[np.isfinite(group.distances)]).max(initial=0.0))
     if not reach:
         return np.zeros(weights.shape[1])
-    passed = path.transfer.with_effects((blur,)).cutoff
-    top = min(END / min(g.pitch_x, g.pitch_y), passed)  # beyond, H is 0
+    top = min(END / min(g.pitch_x, g.pitch_y), _passed(path, blur))  # beyond, H is 0
     count = math.ceil(4 * reach * top) + 1
     f = (np.arange(count) + 0.5) * (top / count)
-    widths = np.abs([g.collecting_width, g.collecting_height]) * np.abs(group.across)
-    aperture = np.sinc(f * widths[0]) * np.sinc(f * widths[1])
-    wavelengths = path.transfer.wavelengths
-    otf = blur.spectral_otf_along(np.append(f, top), group.across, wavelengths)
-    if otf is None:
-        return None
-    transfer, left = otf[:, :-1], np.real(otf[:, -1:])
-    distance = np.where(np.isfinite(group.distances), group.distances, 0.0)
-    mix = np.eye(weights.shape[2])
-    if len(weights) == 1:  # of one component all wavelengths are seen together
-        mix, weights = weights[0], np.eye(weights.shape[1])[None]
-    parts = mix @ ((transfer - left) * aperture / (np.pi * f))
-    waves = _waves(parts, f, distance.ravel()).reshape(-1, *distance.shape)
-    box = half_plane_cover(distance, widths[:1], widths[1:]) - 0.5
-    taken = np.multiply.outer(mix @ (1 - left[:, 0]), box) - waves  # (J, n, m)
-    taken[:, ~np.isfinite(group.distances)] = 0
+    frequency = np.append(f, top)
+    parts: Sequence[tuple[Array, Map | None]] = []
+    mix = np.eye(weights.shape[1])
+    if blur is path.field:
+        parts = field_along(path.transfer, path.field_rings, g, frequency, group.across)
+    for uniform in of_kind([blur], Blur):
+        otf = uniform.spectral_otf_along(frequency, group.across, path.transfer.wavelengths)
+        if otf is None:
+            return None
+        # of one component all wavelengths are seen together
+        mix = weights[0] if len(weights) == 1 else np.eye(weights.shape[2])
+        parts = [(otf - 1, None)]
+    if len(weights) == 1:
+        weights = np.eye(weights.shape[1])[None]
     steps = np.tensordot(weights, group.heights, axes=(0, 0))  # (C, J, strips, n)
     # of every edge by itself: (n, C strips, J) by (n, J, m)
-    each = np.ascontiguousarray(steps.transpose(3, 0, 2, 1)).reshape(steps.shape[3], -1, len(taken))
-    change = np.matmul(each, taken.transpose(1, 0, 2)).swapaxes(0, 1)
-    change = change.reshape(len(steps), steps.shape[2], *distance.shape)
+    each = np.ascontiguousarray(steps.transpose(3, 0, 2, 1))
+    each = each.reshape(steps.shape[3], -1, steps.shape[1])
+    change: Array = np.zeros(())
+    for added, weight in parts:
+        taken = _taken(path, group, f, mix @ added)
+        own = np.matmul(each, taken.transpose(1, 0, 2)).swapaxes(0, 1)
+        own = own.reshape(len(steps), steps.shape[2], *group.distances.shape)
+        change = change + (own if weight is None else own * _at_pixels(path, group, weight))
     size, strips = int(group.pixels.max()) + 1, change.shape[1]
     place = (size * np.arange(strips)[:, None] + group.pixels.ravel()).ravel()
     squares = np.zeros(len(change))
     for color, parts_of_pixels in enumerate(change):
         at_pixels = np.bincount(place, parts_of_pixels.ravel(), strips * size)
-        squares[color] = np.square(at_pixels).reshape(strips, size).sum(axis=1) @ group.counts
+        at_strips = at_pixels.reshape(strips, size)
+        if strips > len(group.counts):
+            squares[color] = np.square(_of_lines(path, group, at_strips)).sum()
+        else:
+            squares[color] = np.square(at_strips).sum(axis=1) @ group.counts
     return squares
+
+
+def _passed(path: OpticalPath, blur: Blur | FieldTransfer) -> float:
+    """Return the frequency from which a blur passes nothing [cycles/m]."""
+    if blur is path.field:
+        shortest = float(path.transfer.wavelengths[0])
+        return max(ring.blur.cutoff(shortest) for ring in path.field_rings)
+    return path.transfer.with_effects((blur,)).cutoff
+
+
+def _taken(path: OpticalPath, group: EdgeGroup, f: Array, added: Array) -> Array:
+    """Return what is taken from edges of height 1 at pixels beside them (J, n, m).
+
+    `added` is H - 1 (J, k + 1) at the frequencies f (k,) and at their end.
+    """
+    g = path.geometry
+    widths = np.abs([g.collecting_width, g.collecting_height]) * np.abs(group.across)
+    aperture = np.sinc(f * widths[0]) * np.sinc(f * widths[1])
+    left = np.real(added[:, -1:])
+    distance = np.where(np.isfinite(group.distances), group.distances, 0.0)
+    parts = (added[:, :-1] - left) * aperture / (np.pi * f)
+    waves = _waves(parts, f, distance.ravel()).reshape(-1, *distance.shape)
+    box = half_plane_cover(distance, widths[:1], widths[1:]) - 0.5
+    taken: Array = np.multiply.outer(-left[:, 0], box) - waves
+    taken[:, ~np.isfinite(group.distances)] = 0
+    return taken
+
+
+def _at_pixels(path: OpticalPath, group: EdgeGroup, weight: Map) -> Array:
+    """Return a map at the pixels of a group (strips, n, m).
+
+    Where one strip represents all lines, its rows are those of the map, between which it is
+    straight, and with it the sum over all maps.
+    """
+    x, y = pixel_centers(path.geometry)
+    at, lines = (x, y) if group.in_rows else (y, x)
+    along = at[group.pixels % len(at)]
+    if group.counts[0] > 1:
+        found = weight.along(along.ravel(), group.in_rows)
+        return found.reshape(-1, *along.shape)
+    line = lines[group.pixels // len(at)]
+    return weight.at(*((along, line) if group.in_rows else (line, along)))[None]
+
+
+def _of_lines(path: OpticalPath, group: EdgeGroup, at_rows: Array) -> Array:
+    """Return values at all lines of pixels (lines, n) from those at the rows of a map."""
+    x, y = pixel_centers(path.geometry)
+    g = path.geometry
+    lines, half = (y, g.sensor_height / 2) if group.in_rows else (x, g.sensor_width / 2)
+    return linear(at_rows, map_position(lines, half))
 
 
 def _waves(parts: Array, f: Array, places: Array) -> Array:
