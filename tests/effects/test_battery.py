@@ -87,7 +87,7 @@ CASES: dict[str, Case] = {
     "distortion": Case(
         {"optics.distortion": {"k1": -25}},
         {"optics.distortion": "none"},
-        {"scene.source": WAVE, "array.rows": 8},
+        {"scene.source": WAVE, "array.rows": 8, "accuracy": "standard"},
     ),
     "lateral_color": Case(
         {"optics.lateral_color": {"table": {500: "1 %", 600: "2 %"}}},
