@@ -66,8 +66,8 @@ CAMERAS = {
         "accuracy": "standard",
         DARK: "100 e/s",
         "optics.lateral_color": {"table": {450: "-2 %", 650: "2 %"}},
-        "array.rows": 24,
-        "array.columns": 32,
+        "array.rows": 12,
+        "array.columns": 16,
     }
     | BAYER
     | PATCHES
@@ -89,12 +89,14 @@ CAMERAS = {
         "pixel.fpn": {"offset_pixel": "1.5 e", "gain_pixel": "0.05 %"},
     },
     "a ccd in stray light": {
+        "array.rows": 24,
+        "array.columns": 32,
         "scene.radiance": radiance_for(6e4),
         "accuracy": "standard",
         DARK: "5 ke/s",
         "optics.zernike": {4: "0.05 um"},
         "optics.low_pass": {"displacement": "1 um", "axes": "diagonal"},
-        "optics.distortion": {"k1": -0.5},
+        "optics.distortion": {"k1": -4},
         "optics.lateral_color": {"table": {450: "-0.5 %", 650: "0.5 %"}},
         "optics.stray_light": 0.03,
         "scene.camera_motion": {"jitter": "0.3 px"},
@@ -127,6 +129,8 @@ CAMERAS = {
     }
     | EDGE,
     "a lamp in the picture, and a little stray light": {
+        "array.rows": 24,
+        "array.columns": 32,
         "scene.source": {"kind": "chart", "chart": "hdr-patches"},
         "scene.camera_motion": {"pan": "1 deg/s"},
         "scene.radiance": radiance_for(3e6),
