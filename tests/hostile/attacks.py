@@ -9,6 +9,7 @@ docs/attacks.md has a row for each kind. `make attacks` runs them all and writes
 import re
 import sys
 from collections import Counter
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,15 @@ import pytest
 FOLDER = Path(__file__).parent
 TABLE = FOLDER.parents[1] / "docs" / "attacks.md"
 ROW = re.compile(r"\| ([^|]+?) \| +(\d+) \| +(\d+) \|")
+
+TRIED = pytest.StashKey[dict[str, str]]()
+"""Attacks of a run that collects all of this folder: test -> kind."""
+
+
+def kinds(items: Iterable[pytest.Item]) -> dict[str, str]:
+    """Return the attacks among tests: test -> kind."""
+    marked = ((item.nodeid, item.get_closest_marker("attack")) for item in items)
+    return {test: mark.args[0] for test, mark in marked if mark}
 
 
 class Count:
@@ -27,10 +37,7 @@ class Count:
         self._kinds: dict[str, str] = {}
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
-        for item in items:
-            mark = item.get_closest_marker("attack")
-            if mark:
-                self._kinds[item.nodeid] = mark.args[0]
+        self._kinds = kinds(items)
         self.tried.update(self._kinds.values())
         items[:] = [item for item in items if item.nodeid in self._kinds]
 
