@@ -135,12 +135,19 @@ def test_what_is_hidden_is_guessed_and_its_error_told(seed, tmp_path):
     assert np.abs(found - truth)[INNER].max() <= told.hidden_most
 
 
-def test_layers_are_as_many_as_the_tolerance_asks_for(tmp_path):
+@pytest.mark.parametrize(
+    "accuracies",
+    long_except(
+        [("5 %", "draft", "standard")],
+        [("5 %", "draft", "standard"), ("draft", "standard", "0.1 %")],
+    ),
+)
+def test_layers_are_as_many_as_the_tolerance_asks_for(accuracies, tmp_path):
     light = patches(np.random.default_rng(1), 64)
     depth = np.repeat(np.geomspace(0.5, 2, 64)[:, None], 64, axis=1)
     given = with_depth(tmp_path, light, depth, 1.0)
     counts, errors = [], []
-    for accuracy in ("5 %", "draft", "standard"):
+    for accuracy in accuracies:
         _, frame = seen(tmp_path, given, {"accuracy": accuracy, "array.rows": 16})
         counts.append(frame.spectrum.cut.layers)
         errors.append(frame.scene.cut.error)

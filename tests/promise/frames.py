@@ -209,13 +209,13 @@ def frame_of(kind: str, number: str | int) -> Frame:
     return KINDS[kind].draw(Draw(kind, int(number)))
 
 
-def measure(kind: str, number: str | int, folder: Path) -> Judged:
-    """Judge one frame."""
+def measure(kind: str, number: str | int, folder: Path, at_reference: bool = True) -> Judged:
+    """Judge one frame. at_reference: whether it is judged there, too, where its kind is."""
     frame = frame_of(kind, number)
     if number in frame_named.TIGHT_CASES:
         return judge(kind, str(number), frame, folder, frame_named.TIGHT, "all")
     tolerances = dict(TOLERANCES)
-    if kind in KINDS and int(number) % KINDS[kind].at_reference:
+    if not at_reference or (kind in KINDS and int(number) % KINDS[kind].at_reference):
         del tolerances["reference"]
     return judge(kind, str(number), frame, folder, tolerances)
 

@@ -23,7 +23,9 @@ import pytest
         ("moved", "100024"),  # 2.9 T: coarse samples of a spread ring beyond their grid
         ("moved", "200218"),  # lobes of coarse samples below zero: light is clipped there
         ("moved", "100068"),  # 1.1 T: their transfer ends with a jump, not along a table
-        ("layers", "100008"),  # 1.5 T: halves and thirds of a pixel, gaps among them, agreed
+        # 1.5 T: halves and thirds of a pixel, gaps among them, agreed; at reference it takes 3 s,
+        # and errs at standard
+        pytest.param("layers", "100008", marks=pytest.mark.long),
         # 3.1 T: gaps of three fifths of a pixel as one cell; 8 s, and the quick test of the cells
         # that rays lie in finds that, too
         pytest.param("layers", "200009", marks=pytest.mark.long),
@@ -35,4 +37,11 @@ import pytest
 )
 def test_a_frame_keeps_every_tolerance(kind, name, tmp_path):
     found = frames.measure(kind, name, tmp_path)
+    assert not found.misses, found.text
+
+
+def test_halves_and_thirds_of_a_pixel_do_not_agree_by_chance(tmp_path):
+    """The frame above whose gaps both missed, at the tolerances that it missed."""
+    found = frames.measure("layers", "100008", tmp_path, at_reference=False)
+    assert set(found.mean) == {"draft", "standard"}
     assert not found.misses, found.text
