@@ -49,9 +49,11 @@ steepest, half as many in the mean over the rings."""
 WORK, WORK_OF_TRANSFER, WORK_OF_PIXEL = 12_000_000, 1_000_000, 16
 """Temporary arrays of one thread, for each transfer of a mixture in a color besides, and for a
 pixel of small arrays at most [bytes]."""
-PERIOD = 110_000_000
-"""Cells of one period of leaves and their sums, from which the wide cells of rings are read, as
-measured before 24 x 32 pixels [bytes]."""
+PERIOD = 92_000_000
+"""Leaves of one period, from which wide cells of rings are read [bytes]: 18 for each of 1500 x 1500
+cells are kept, and 8 MB of the cells of narrower rings; 97 for each of 262 144 cells are in use
+while these are painted; and averages of two pictures over 192 columns of 1500 rows, in four planes
+of 32 bits."""
 EDGE = 46
 """Of a pixel that the response of a slanted edge is found from: codes, distances from the edge, and
 their order, as measured [bytes]."""

@@ -315,10 +315,10 @@ class DeadLeaves(Chart):
             return
         far = max(float(edges[-1] - edges[0]) for edges in (x_edges, y_edges)) > PERIOD * self.unit
         if self._parts(x_edges, y_edges, FINEST) >= (SUMMED_FAR if far else SUMMED):
-            known = _period_cells(self.seed, tuple(map(tuple, mix.tolist())), mix.dtype)
-            for plane, cells in zip(out, known, strict=True):
-                rows = _periodic_averages(cells, y_edges / self.unit, 0)
-                plane[:] = _periodic_averages(rows, x_edges / self.unit, 1)
+            colors, columns = tuple(map(tuple, mix.tolist())), tuple((x_edges / self.unit).tolist())
+            known = _period_columns(self.seed, colors, mix.dtype, columns)
+            for plane, rows in zip(out, known, strict=True):
+                plane[:] = _periodic_averages(rows, y_edges / self.unit, 0)
         else:
             self._paint_parts(parts, x_edges, y_edges, mix, out)
         if hidden is not None:
@@ -388,17 +388,25 @@ def _divided(edges: Array, parts: int) -> Array:
 
 
 @lru_cache(maxsize=2)
-def _period_cells(seed: int, mix: tuple[tuple[float, ...], ...], dtype: np.dtype) -> Array:
-    """Return the averages over the finest cells of one period: (R, n, n)."""
+def _period_columns(
+    seed: int, mix: tuple[tuple[float, ...], ...], dtype: np.dtype, x_edges: tuple[float, ...]
+) -> Array:
+    """Return averages over columns in each finest row of one period: (R, n, columns).
+
+    Averages over all the finest cells would take eight times the memory of those over 192 columns.
+    """
     edges = cell_edges(round(PERIOD * FINEST), 1 / FINEST)
-    count = len(edges) - 1
-    out = np.empty((len(mix), count, count), dtype)
+    count, columns = len(edges) - 1, np.array(x_edges)
+    out = np.empty((len(mix), count, len(columns) - 1), dtype)
     leaves = DeadLeaves(seed, 1.0).crop_to_cells(edges, edges)
 
     band = AT_ONCE // count
     for top in range(0, count, band):
-        rows = out[:, top : top + band]
-        leaves.paint(edges, edges[top : top + band + 1], np.array(mix, dtype), rows)
+        y = edges[top : top + band + 1]
+        cells = np.empty((len(mix), len(y) - 1, count), dtype)
+        leaves.paint(edges, y, np.array(mix, dtype), cells)
+        for plane, fine in zip(out[:, top : top + band], cells, strict=True):
+            plane[:] = _periodic_averages(fine, columns, 1)
     return out
 
 
