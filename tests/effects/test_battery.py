@@ -77,7 +77,7 @@ CASES: dict[str, Case] = {
     "depth": Case(
         two_layers("0.5 m"),
         two_layers("1 m"),
-        {"scene.radiance": radiance_for(900), "array.rows": 8},
+        {"scene.radiance": radiance_for(900), "array.rows": 8, "accuracy": "standard"},
     ),
     "motion": Case(
         {"scene.camera_motion": {"pan": "20 deg/s"}},
