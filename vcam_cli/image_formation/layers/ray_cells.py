@@ -350,7 +350,7 @@ class SharpImage:
         """Return the means over the collecting areas of images, of their spectra (..., h, k).
 
         The spectra have passed `_on`, and so the mean over what a pixel collects along y: pixels
-        are every so many cells apart, which folds the spectrum. Along x it is taken of cells.
+        are `per_pixel` cells apart, which folds the spectrum. Along x it is taken of cells.
         """
         n, (rows, columns) = cells.per_pixel, cells.inner
         folded = spectrum[..., : rows // n, :]

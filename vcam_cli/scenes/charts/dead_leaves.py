@@ -364,7 +364,7 @@ class DeadLeaves(Chart):
             cells[:] = make().averages(mix)
 
     def _covered(self, x_edges: Array, y_edges: Array, parts: int) -> "CoveredCells":
-        """Return which leaves are seen where on cells, painted on so many parts of each side."""
+        """Return which leaves are seen where on cells, painted on `parts` parts of each side."""
         laid = replace(self, keep=False).crop_to_cells(x_edges, y_edges)
         assert isinstance(laid, PlacedLeaves)
         x, y = x_edges / self.unit, y_edges / self.unit
