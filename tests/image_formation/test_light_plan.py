@@ -172,3 +172,11 @@ def test_the_set_that_saves_most_is_left_out(tmp_path, monkeypatch):
         plan = prepare(camera(tmp_path, changes | {"accuracy": tolerance}), 1)[0].plan
         states = {d.name: d.state for d in plan.decisions}
         assert (states[slow], states[other]) == ("off", "on")
+
+
+@pytest.mark.parametrize(("coma", "state"), [("20 nm", "off"), ("200 nm", "on")])
+def test_a_blur_over_the_field_is_left_out_where_edges_change_little(coma, state, tmp_path):
+    lens = {"optics.zernike": [{"field": 0, 8: "0 nm"}, {"field": 1, 8: coma}]}
+    small = {"pixel.width": "4 um", "optics.f_number": 2.8, "accuracy": "draft"}
+    changes = small | WEDGE | lens | {"effects": "auto"}
+    assert states(tmp_path, changes)["aberration"] == state
