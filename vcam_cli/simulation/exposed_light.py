@@ -294,7 +294,6 @@ def _full_charge(
         return joined
     shares = [each.timely_share(*lit.shape[-2:]) for each in of_kind(effects, Transport)]
     room = np.maximum(kind(full_rate - dark) - lit, kind(0))
-    limited: Array = np.minimum(
-        found + np.prod(shares, axis=0).astype(kind) * room, kind(full_rate)
-    )
+    share = math.prod(shares[1:], start=shares[0]).astype(kind)
+    limited: Array = np.minimum(found + share * room, kind(full_rate))
     return limited
