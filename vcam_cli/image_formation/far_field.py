@@ -213,6 +213,7 @@ class FarField:
             image_filter = part.image_filter(self.near, self.path, self.highest)
             own = modes if number < followed else ()
             yield from filtered_layers(image_filter, own, spectrum, self.path.workers)
+            del spectrum  # not held beside the next one
 
 
 def _low_pass(axis: Axis) -> Array:

@@ -273,6 +273,7 @@ def gathered(
         weight = 1.0 if layer.weight is None else layer.weight(columns + at[0], rows + at[1])
         for color, plane in enumerate(out):
             plane += layer.values(color, slice(0, g.rows)) * weight
+        del layer  # its series is not held beside the next one
     return out
 
 
