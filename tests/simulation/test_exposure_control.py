@@ -101,5 +101,5 @@ def test_following_is_said_to_change_nothing_in_a_single_frame(tmp_path, monkeyp
     assert len(said) == 1
     assert "only in sequences" in said[0]
     with OutputFolder(tmp_path / "out") as folder:
-        first = write_sequence(made, 2, RATE, folder, None, Silent())
+        first, _ = write_sequence(made, 2, RATE, folder, None, Silent())
     assert not [note for note in first.notes if "exposure.auto.follow" in note]

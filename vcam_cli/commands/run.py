@@ -54,13 +54,14 @@ def run(
     inputs = provenance.inputs(model)
     place = OutputFolder(out or Path("out") / model.name, inputs=inputs)
     with place as folder, Progress(quiet) as progress:
+        memory = 0
         if frames is None:
             result = simulate(model, workers, progress, device=device)
             outputs.write(result, folder)
         else:
             assert fps is not None
-            result = write_sequence(model, frames, fps, folder, workers, progress, device)
-        record = outputs.finish(result, folder, inputs, lambda: time.perf_counter() - start)
+            result, memory = write_sequence(model, frames, fps, folder, workers, progress, device)
+        record = outputs.finish(result, folder, inputs, lambda: time.perf_counter() - start, memory)
     for note in result.notes:
         options.say(note, quiet)
     if as_json:

@@ -164,7 +164,7 @@ def write_sequence(
     workers: int | None,
     watch: Observer,
     device: str = "cpu",
-) -> Result:
+) -> tuple[Result, int]:
     """Write frames/raw_0001.exr, frames/render_0001.png and so on, frames.csv and strip.png.
 
     Where ffmpeg is installed sequence.mp4 shows the renders, too.
@@ -184,10 +184,12 @@ def write_sequence(
 
     Returns
     -------
-    Result
+    first : Result
         The first frame, with a note where there is no video.
+    memory : int
+        Largest estimated memory of a frame [bytes].
     """
-    rows, shown = [], list[Array]()
+    rows, shown, memory = [], list[Array](), 0
     chosen = set(np.linspace(0, count - 1, min(count, STRIP)).round().astype(int).tolist())
     first: Result | None = None
     program = ffmpeg()
@@ -200,6 +202,7 @@ def write_sequence(
                 missing = bool(camera.output.render) and program is None
                 told = sequence_notes(result.remarks) + ((NO_VIDEO,) if missing else ())
                 result = first = replace(result, remarks=told)
+            memory = max(memory, result.frame.plan.memory_bytes)
             name = f"{number + 1:04d}"
             outputs.write_raw(result, folder.new(f"frames/raw_{name}.exr"))
             if camera.output.render:
@@ -223,4 +226,4 @@ def write_sequence(
             folder.new("strip.png"), np.concatenate(shown, axis=1), f"{rate:g} frames a second"
         )
     write_table(folder.new("frames.csv"), columns, rows)
-    return first
+    return first, memory

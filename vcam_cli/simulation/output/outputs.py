@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -71,7 +72,11 @@ def save(result: Photograph, out: Path) -> Path:
 
 
 def finish(
-    result: Photograph, folder: OutputFolder, inputs: tuple[Path, ...], seconds: Callable[[], float]
+    result: Photograph,
+    folder: OutputFolder,
+    inputs: tuple[Path, ...],
+    seconds: Callable[[], float],
+    memory: int = 0,
 ) -> dict[str, Any]:
     """Write the report where it is requested, and the record.
 
@@ -85,6 +90,8 @@ def finish(
         Files that the run read.
     seconds : callable
         Returns the time of the run so far [s].
+    memory : int, optional
+        Estimated memory of other frames of the run [bytes].
 
     Returns
     -------
@@ -99,9 +106,9 @@ def finish(
     if result.frame.solved.output.report:
         from vcam_cli.simulation.output import run_report
 
-        known = record(result, inputs, seconds())
+        known = record(result, inputs, seconds(), memory)
         run_report.write(folder.new("report.html"), result, known)
-    found = record(result, inputs, seconds())
+    found = record(result, inputs, seconds(), memory)
     folder.finish(found)
     return found
 
@@ -339,7 +346,9 @@ def config_hash(camera: Camera) -> str:
     return hash_text(to_json(camera.model_dump(mode="json")))
 
 
-def record(result: Photograph, inputs: tuple[Path, ...], seconds: float) -> dict[str, Any]:
+def record(
+    result: Photograph, inputs: tuple[Path, ...], seconds: float, memory: int = 0
+) -> dict[str, Any]:
     """Return the contents of `run.json`, without the names of the files.
 
     Parameters
@@ -350,6 +359,8 @@ def record(result: Photograph, inputs: tuple[Path, ...], seconds: float) -> dict
         Files that the run read.
     seconds : float
         Time of the run [s].
+    memory : int, optional
+        Estimated memory of other frames of the run [bytes].
 
     Returns
     -------
@@ -358,10 +369,11 @@ def record(result: Photograph, inputs: tuple[Path, ...], seconds: float) -> dict
     """
     frame = result.frame
     camera = frame.camera
+    plan = replace(frame.plan, memory_bytes=max(frame.plan.memory_bytes, memory))
     return {
         "name": camera.name,
         "camera": camera.model_dump(mode="json"),
-        "plan": frame.plan.report(),
+        "plan": plan.report(),
         "geometry": frame.layout.report(frame.spectrum.oversampling),
         "exposure": exposure_report(frame).report(),
         **({"captures": _samples(frame)} if frame.times else {}),
