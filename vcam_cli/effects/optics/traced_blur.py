@@ -87,7 +87,7 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
         """Take a pickled state, with a lock of its own."""
         self.__dict__.update(state, lock=Lock())
 
-    working_bytes = 60_000_000  # libraries of 28 MB, and rays, as measured before two scenes
+    working_bytes = 60_000_000  # libraries, 28 MB; the rest was fitted to peaks before two scenes
 
     @classmethod
     def from_camera(cls, camera: Camera, geometry: Geometry) -> None:

@@ -25,6 +25,7 @@ from vcam_cli.physics.aberration import GRID_CACHE_BYTES
 from vcam_cli.physics.pupil_harmonics import MOST
 from vcam_cli.scenes.bands import bands_of_rows
 from vcam_cli.scenes.base import ChartScene, SampledScene
+from vcam_cli.scenes.charts import dead_leaves
 
 BASE = 155_000_000
 """Interpreter and libraries of `vcam run`, 132 to 145 MB; a call of the library takes
@@ -38,9 +39,10 @@ files [bytes]: 27 and 45 MB were measured for `dual-pixel`, beyond what its ligh
 COMPARED, COMPARED_COLOR = 35, 10
 """What comparing an image with the ideal one takes for a pixel, and for each of its colors besides
 [bytes]: 44.0 were measured of one color, 64.0 of three."""
-TRANSPORTED = 11
-"""Planes of a frame whose charge is transported: light, what is collected of it, what arrives, that
-of a full well, and what is added up of them, as measured for `eev-44-82`."""
+TRANSPORTED = 9
+"""Planes of a frame whose charge is transported, in use where the charge of a full well is found:
+light, what is collected and read of it, what is beyond the well and room in it are five, a share of
+64 bits counts as two, rounded it is one more, and so is its product, as traced for `eev-44-82`."""
 SLACK = 1.1
 """Memory of the process over what is in use: freed memory is not given back at once."""
 FEW_HARMONICS = 64
@@ -49,11 +51,14 @@ steepest, half as many in the mean over the rings."""
 WORK, WORK_OF_TRANSFER, WORK_OF_PIXEL = 12_000_000, 1_000_000, 16
 """Temporary arrays of one thread, for each transfer of a mixture in a color besides, and for a
 pixel of small arrays at most [bytes]."""
-PERIOD = 92_000_000
+PART = 150
+"""Of each part of cells that are painted in parts: 39 MB were taken of 255 744 of them [bytes]."""
+PARTS_AT_ONCE = 1 << 18
+"""Parts of cells that are painted at once where cells are divided, see `Chart.undivided`."""
+PERIOD = 67_000_000
 """Leaves of one period, from which wide cells of rings are read [bytes]: 18 for each of 1500 x 1500
-cells are kept, and 8 MB of the cells of narrower rings; 97 for each of 262 144 cells are in use
-while these are painted; and averages of two pictures over 192 columns of 1500 rows, in four planes
-of 32 bits."""
+cells are kept, and 8 MB of the cells of narrower rings; averages of two pictures over 192 columns
+of 1500 rows, in four planes of 32 bits, are kept besides."""
 EDGE = 46
 """Of a pixel that the response of a slanted edge is found from: codes, distances from the edge, and
 their order, as measured [bytes]."""
@@ -107,10 +112,13 @@ def image_bytes(
     painted = held = 0
     for each, part in parts:
         samples = each * _samples(path, part, highest, planes)
+        if part is not scene and isinstance(part, ChartScene) and part.is_painted:
+            # as it is painted, which the next ring subtracts, and a copy that is transformed
+            samples = (width + each) * planes * math.prod(part.shape)
         held = max(held, samples + each * series * _series(path, part, filtered))
         at_once = _painting_bytes(path, part, each * planes)
         if part is not scene and isinstance(part, ChartScene) and part.chart.edge_seconds:
-            at_once += PERIOD
+            at_once += PERIOD * _reads_a_period(part)
         painted = max(painted, round(SLACK * samples) + at_once)
     pixels = g.rows * g.columns
     filtering = round(SLACK * (held + pixels * width)) + work_bytes(
@@ -213,8 +221,19 @@ def _painting_bytes(path: OpticalPath, scene: SampledScene, width: int) -> int:
     if not (isinstance(scene, ChartScene) and scene.is_painted):
         return 0
     rows, columns = scene.shape
-    band = int(columns * bands_of_rows(rows, columns)[0].stop)
-    return path.workers * band * (width + scene.chart.cell_bytes)
+    bands = bands_of_rows(rows, columns)
+    band, threads = columns * bands[0].stop, min(path.workers, len(bands))
+    largest = max(scene.pitch_x, scene.pitch_y) / scene.chart.undivided
+    parts = min(math.ceil(largest) ** 2 * band, PARTS_AT_ONCE) if largest > 1 else 0
+    cell_bytes: int = scene.chart.cell_bytes
+    return int(threads * (band * (width + cell_bytes) + parts * PART))
+
+
+def _reads_a_period(scene: ChartScene) -> bool:
+    """Return whether leaves on the scene's cells are read from sums over one period."""
+    unit = scene.chart.undivided * dead_leaves.UNDIVIDED
+    cell = max(scene.pitch_x, scene.pitch_y) / unit
+    return dead_leaves.reads_a_period(cell, max(scene.extent) / unit)
 
 
 def _series(path: OpticalPath, scene: SampledScene, highest: float) -> int:

@@ -58,6 +58,10 @@ an rms of 6e-5 in single cells, and of 1e-3 in those beyond, which lenses blur b
 EDGE_SECONDS = 0.035, 0.0135
 """Core seconds to find the edges that a frame sees, and more for each division of cells,
 calibrated."""
+CELL_BYTES = 95
+"""Temporary arrays for each cell [bytes]: 12 to 110 were measured, most where a band sees half of
+the leaves of a frame. What libraries take less than is counted covers 15 of a band of 2^19 cells.
+"""
 DARKEST = 0.25
 """Lower bound of a leaf's own factor, which is uniform between this and 1."""
 
@@ -257,9 +261,7 @@ class DeadLeaves(Chart):
     whole grid is known."""
     divided = property(lambda self: divisions(self.cell_error))
     edge_seconds = property(lambda self: EDGE_SECONDS[0] + EDGE_SECONDS[1] * self.divided)
-    cell_bytes = (
-        110  # 12 to 110 were measured, most where a band sees half of the leaves of a frame
-    )
+    cell_bytes = CELL_BYTES
     undivided = property(lambda self: self.unit / UNDIVIDED)
 
     def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
@@ -313,8 +315,9 @@ class DeadLeaves(Chart):
         if parts == 1 and not (self.keep and hidden is None):
             self._placed_leaves(x_edges, y_edges).paint(x_edges, y_edges, mix, out, hidden)
             return
-        far = max(float(edges[-1] - edges[0]) for edges in (x_edges, y_edges)) > PERIOD * self.unit
-        if self._parts(x_edges, y_edges, FINEST) >= (SUMMED_FAR if far else SUMMED):
+        both = x_edges / self.unit, y_edges / self.unit
+        cell, extent = max(np.diff(at).max() for at in both), max(np.ptp(at) for at in both)
+        if reads_a_period(float(cell), float(extent)):
             colors, columns = tuple(map(tuple, mix.tolist())), tuple((x_edges / self.unit).tolist())
             known = _period_columns(self.seed, colors, mix.dtype, columns)
             for plane, rows in zip(out, known, strict=True):
@@ -338,10 +341,10 @@ class DeadLeaves(Chart):
         order = np.argsort(at, kind="stable")
         return at[order], np.argsort(order)
 
-    def _parts(self, x_edges: Array, y_edges: Array, count: int = UNDIVIDED) -> int:
-        """Return into how many parts along each side cells are divided, `count` of them a side."""
+    def _parts(self, x_edges: Array, y_edges: Array) -> int:
+        """Return into how many parts along each side cells are divided."""
         largest = max(float(np.diff(edges).max()) for edges in (x_edges, y_edges))
-        return max(1, math.ceil(largest / self.unit * count * (1 - 1e-9)))
+        return max(1, math.ceil(largest / self.unit * UNDIVIDED * (1 - 1e-9)))
 
     def _paint_parts(
         self, parts: int, x_edges: Array, y_edges: Array, mix: Array, out: Array
@@ -364,7 +367,7 @@ class DeadLeaves(Chart):
             cells[:] = make().averages(mix)
 
     def _covered(self, x_edges: Array, y_edges: Array, parts: int) -> "CoveredCells":
-        """Return which leaves are seen where on cells, painted on `parts` parts of each side."""
+        """Return which leaves are seen where on cells, painted on `parts` of each side."""
         laid = replace(self, keep=False).crop_to_cells(x_edges, y_edges)
         assert isinstance(laid, PlacedLeaves)
         x, y = x_edges / self.unit, y_edges / self.unit
@@ -379,6 +382,18 @@ class DeadLeaves(Chart):
         wide = max(float(np.diff(at).max()) for at in (x, y)) / self.unit * FINEST
         divided = divisions(self.cell_error / max(wide, 1.0))
         return PlacedLeaves(copies, self.unit, divided, bool(self.keep))
+
+
+def reads_a_period(cell: float, extent: float) -> bool:
+    """Return whether cells are so wide that they are read from sums over one period.
+
+    Parameters
+    ----------
+    cell, extent : float
+        Longer sides of the largest cell and of all cells together, in units of the frame's longer
+        side.
+    """
+    return cell * FINEST * (1 - 1e-9) > (SUMMED_FAR if extent > PERIOD else SUMMED) - 1
 
 
 def _divided(edges: Array, parts: int) -> Array:
