@@ -379,7 +379,7 @@ class DeadLeaves(Chart):
         left, right, top, bottom = (end / self.unit for end in (x[0], x[-1], y[0], y[-1]))
         leaves = generate_leaves(self.seed)
         copies = _periodic_copies(leaves, left, right, top, bottom)
-        wide = max(float(np.diff(at).max()) for at in (x, y)) / self.unit * FINEST
+        wide = max(float(np.diff(at).max(initial=0.0)) for at in (x, y)) / self.unit * FINEST
         divided = divisions(self.cell_error / max(wide, 1.0))
         return PlacedLeaves(copies, self.unit, divided, bool(self.keep))
 
