@@ -110,6 +110,7 @@ def test_what_a_failed_study_finds_stays(monkeypatch):
     assert {p.name: p.read_bytes() for p in Path("out/study").iterdir()} == before
 
 
+@pytest.mark.draws
 def test_a_full_disk_ends_with_3(monkeypatch):
     def full(_, path):
         raise CannotDo(f"cannot write {path}: the disk is full", "free some space")
