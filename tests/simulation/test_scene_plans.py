@@ -181,3 +181,8 @@ def test_options_that_need_others_are_refused_without_them(asked):
     done = CliRunner().invoke(app, ["plan", "starter", *asked])
     assert done.exit_code == 2
     assert "--measure needs --scenes" in done.output
+
+
+def test_times_have_no_power_of_ten():
+    texts = {0.0213: "0.021", 2.25: "2.2", 9.96: "10", 143.2: "143"}
+    assert {time: scene_plans.time_text(time) for time in texts} == texts

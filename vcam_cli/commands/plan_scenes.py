@@ -71,7 +71,7 @@ def print_scenes(plans: "Sequence[ScenePlan]") -> None:
 
     Elsewhere than in a terminal a scene has a line, in a terminal an effect.
     """
-    from vcam_cli.simulation.scene_plans import effect_names, mark, seconds_text
+    from vcam_cli.simulation.scene_plans import effect_names, mark, time_text
 
     effects = effect_names(plans)
     names = [*effects, "plan [s]", "all [s]"]
@@ -79,7 +79,7 @@ def print_scenes(plans: "Sequence[ScenePlan]") -> None:
     lines, columns = [f"{'':<{width}}  " + " ".join(names)], []
     for each in plans:
         marks = {d.name: mark(d) for d in each.decisions}
-        times = [seconds_text(seconds) for seconds in each.seconds]
+        times = [time_text(seconds) for seconds in each.seconds]
         columns.append([marks.get(name, "-") for name in effects] + times)
         cells = (f"{text:<{len(name)}}" for name, text in zip(names, columns[-1], strict=True))
         lines.append(f"{each.scene:<{width}}  " + " ".join(cells).rstrip())

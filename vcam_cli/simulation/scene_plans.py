@@ -166,20 +166,20 @@ def rows(plans: Sequence[ScenePlan]) -> Iterator[tuple[str | float, ...]]:
             yield (each.scene, d.name, d.state, *amounts, seconds, *taken)
 
 
-def seconds_text(seconds: float) -> str:
-    """Return a time to two digits, without a power of ten.
+def time_text(time: float) -> str:
+    """Return a time to two digits or more, without a power of ten.
 
     Parameters
     ----------
-    seconds : float
-        Time [s].
+    time : float
+        Time, in any unit.
 
     Returns
     -------
     str
         Text.
     """
-    return f"{seconds:.2g}" if seconds < 9.95 else f"{seconds:.0f}"
+    return f"{time:.2g}" if time < 9.95 else f"{time:.0f}"
 
 
 def mark(decision: Decision) -> str:
@@ -200,7 +200,7 @@ def mark(decision: Decision) -> str:
         return "free" if decision.free else "on"
     if decision.by == "user":
         return "off"
-    return f"{1000 * decision.saved:.2g}" if decision.saved >= LEAST_SAVED else ""
+    return time_text(1000 * decision.saved) if decision.saved >= LEAST_SAVED else ""
 
 
 def effect_names(plans: Sequence[ScenePlan]) -> list[str]:

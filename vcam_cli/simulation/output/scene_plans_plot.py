@@ -22,7 +22,7 @@ from vcam_cli.simulation.scene_plans import (
     ScenePlan,
     effect_names,
     mark,
-    seconds_text,
+    time_text,
 )
 
 DECADES = 3.0
@@ -138,7 +138,7 @@ def _seconds(axes: Any, plans: Sequence[ScenePlan]) -> None:
         share = auto / every if every else 1.0
         axes.barh(row, 1.0, height=0.72, color="#e3e3e3")
         axes.barh(row, min(share, 1.1), height=0.72, color="#6b6b6b")
-        text = f"{seconds_text(auto)} / {seconds_text(every)}"
+        text = f"{time_text(auto)} / {time_text(every)}"
         axes.text(1.2, row, text, va="center", size=8.5)
     axes.set_xlim(0, 2.6)
     axes.set_ylim(len(plans) - 0.5, -0.5)
