@@ -32,7 +32,7 @@ from vcam_cli.image_formation.estimates.edge_changes import exact_changes, has_s
 from vcam_cli.image_formation.estimates.light_cost import LightCost
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.scenes.base import ChartScene
-from vcam_cli.scenes.blur_change import BlurLoss, ChangeBounds
+from vcam_cli.scenes.blur_change import BlurLoss
 from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.layered import AnyScene, LayeredScene
 from vcam_cli.scenes.waves import WaveScene
@@ -176,7 +176,7 @@ def _blur_shares(cost: LightCost, budget: float) -> dict[Effect, float]:
     bounds = flat.change_bounds(list(losses.values()), path.geometry, path.ceiling, budget)
     shares: dict[Effect, float] = dict(zip(losses, bounds.shares(), strict=True))
     if has_straight_edges(flat):
-        shares |= _edge_shares(cost, flat, losses, bounds, budget)
+        shares |= _edge_shares(cost, flat, losses, shares, bounds.full, budget)
     # Points in place of averages alias what detail there is: only of even light is that nothing.
     detailed = [e for e in of_kind(shares, PixelAperture) if shares[e] > 0]
     return shares | dict.fromkeys(detailed, math.inf)
@@ -186,29 +186,29 @@ def _edge_shares(
     cost: LightCost,
     scene: ChartScene,
     losses: Mapping[Effect, BlurLoss],
-    bounds: ChangeBounds,
+    shares: Mapping[Effect, float],
+    full: float,
     budget: float,
 ) -> dict[Effect, float]:
     """Return what blurs change of straight edges, summed exactly where that may pay.
 
     Beside a blur over the field that stays, no other one saves as much as its sum takes.
     """
-    path, found = cost.path, dict(zip(losses, bounds.shares(), strict=True))
-    exact: dict[Effect, float] = {}
+    path, exact = cost.path, dict[Effect, float]()
     for over_field in of_kind(losses, FieldTransfer):
         even = replace(losses[over_field], is_uniform=True)
         guess = scene.change_bounds([even], path.geometry, path.ceiling, budget).changes[0]
-        worth_it = guess <= LOOSEST_OVER_FIELD * budget * bounds.full
+        worth_it = guess <= LOOSEST_OVER_FIELD * budget * full
         if not (worth_it and cost.saved((over_field,)) > EXACT_OVER_FIELD):
             return {}
         exact |= exact_changes(path, scene, [over_field])
-        if exact.get(over_field, math.inf) > budget * bounds.full:
+        if exact.get(over_field, math.inf) > budget * full:
             return {}
         others = path.with_effects([e for e in path.effects if e is not over_field])
         cost = LightCost(others, cost.scene)
-    loose = [e for e in of_kind(found, Blur) if budget < found[e] <= LOOSEST * budget]
+    loose = [e for e in of_kind(shares, Blur) if budget < shares[e] <= LOOSEST * budget]
     exact |= exact_changes(path, scene, [e for e in loose if cost.saved((e,)) > EXACT])
-    return {blur: change / bounds.full for blur, change in exact.items()}
+    return {blur: change / full for blur, change in exact.items()}
 
 
 def _spread_light(weights: Array, spread: Array) -> tuple[Array, Array]:
