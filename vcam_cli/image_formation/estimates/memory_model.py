@@ -53,8 +53,6 @@ WORK, WORK_OF_TRANSFER, WORK_OF_PIXEL = 12_000_000, 1_000_000, 16
 pixel of small arrays at most [bytes]."""
 PART = 150
 """Of each part of cells that are painted in parts: 39 MB were taken of 255 744 of them [bytes]."""
-PARTS_AT_ONCE = 1 << 18
-"""Parts of cells that are painted at once where cells are divided, see `Chart.undivided`."""
 PERIOD = 67_000_000
 """Leaves of one period, from which wide cells of rings are read [bytes]: 18 for each of 1500 x 1500
 cells are kept, and 8 MB of the cells of narrower rings; averages of two pictures over 192 columns
@@ -224,7 +222,7 @@ def _painting_bytes(path: OpticalPath, scene: SampledScene, width: int) -> int:
     bands = bands_of_rows(rows, columns)
     band, threads = columns * bands[0].stop, min(path.workers, len(bands))
     largest = max(scene.pitch_x, scene.pitch_y) / scene.chart.undivided
-    parts = min(math.ceil(largest) ** 2 * band, PARTS_AT_ONCE) if largest > 1 else 0
+    parts = min(math.ceil(largest) ** 2 * band, dead_leaves.AT_ONCE) if largest > 1 else 0
     cell_bytes: int = scene.chart.cell_bytes
     return int(threads * (band * (width + cell_bytes) + parts * PART))
 
