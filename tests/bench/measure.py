@@ -105,16 +105,10 @@ def take_turns(repeats: int, *works: Callable[[], Cost]) -> list[Cost]:
 
 PEAK = """
 import sys
-from pathlib import Path
 from vcam_cli import load, simulate
+from vcam_cli.memory import peak_memory
 {work}
-status = Path("/proc/self/status")
-if status.exists():  # ru_maxrss begins with that of the process that started this one
-    line = next(x for x in status.read_text().splitlines() if x.startswith("VmHWM"))
-    print(1024 * int(line.split()[1]))
-else:
-    import resource
-    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+print(peak_memory())
 """
 """A process that does some work and prints its peak memory [bytes]."""
 FRAME = "result = simulate(load(sys.argv[1])); result.render, result.metrics"
