@@ -90,10 +90,12 @@ def test_what_is_added_at_a_ring_is_its_blur_turned_with_the_azimuth(lens, tmp_p
     across, azimuth = (0.28, -0.96), np.arctan2(48, 64)
     ring = seen.field_rings[-2]
     frequency = np.linspace(0, 0.95 * ring.blur.cutoff(wavelength), 90)
-    parts = field_along(seen.transfer, seen.field_rings, seen.geometry, frequency, across)
+    changes, weights = field_along(
+        seen.transfer, seen.field_rings, seen.geometry, frequency, across
+    )
     place = ring.weight.place * seen.field.half_diagonal
     x, y = (np.array([place * a]) for a in (np.cos(azimuth), np.sin(azimuth)))
-    found = sum(part if weight is None else part * weight.at(x, y) for part, weight in parts)
+    found = np.tensordot(weights.at(x, y)[:, 0], changes, axes=1)
     turned = replace(ring.blur, angle=azimuth) if hasattr(ring.blur, "angle") else ring.blur
     wanted = turned.otf_along(frequency, across, wavelength) - 1
     level = seen.transfer.level[0, 0]

@@ -42,7 +42,7 @@ def test_they_are_means_over_the_overlap_of_two_pupils(name, wavelength):
     terms = WAVEFRONTS[name]
     own = pupil_harmonics.pupil_harmonics(terms, WAVELENGTHS, zernike.max_slope(terms))
     h, angle = np.array([0.07, 0.4, 0.75]), np.array([0.3, -1.2, 2.5])
-    found = summed(own.amplitudes(h, wavelength), angle)
+    found = summed(own.amplitudes(h[None], np.array([wavelength]))[0], angle)
     x, y = np.random.default_rng(1).uniform(-1, 1, (2, 200_000))
     for k in range(3):
         sx, sy = h[k] * np.cos(angle[k]), h[k] * np.sin(angle[k])

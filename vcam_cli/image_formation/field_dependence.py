@@ -49,10 +49,10 @@ JUDGED_HERE = 33
 
 @dataclass(frozen=True)
 class Map:
-    """A smooth function on the sensor."""
+    """A smooth function on the sensor, or several of them."""
 
     values: Array
-    """(PLACES, PLACES) from edge to edge"""
+    """(PLACES, PLACES) from edge to edge, or (M, PLACES, PLACES) of several; a call takes one."""
     half_width: float
     half_height: float
 
@@ -65,7 +65,7 @@ class Map:
         return linear(rows.T, map_position(x, self.half_width)).T
 
     def along(self, places: Array, in_rows: bool) -> Array:
-        """Return the map's own rows at places x, or its columns at places y: (PLACES, places).
+        """Return the maps' own rows at places x, or their columns at places y.
 
         Parameters
         ----------
@@ -77,18 +77,19 @@ class Map:
         Returns
         -------
         Array
-            Values; between rows they are straight.
+            Values (..., PLACES, n); between rows they are straight.
         """
         half = self.half_width if in_rows else self.half_height
-        return linear(self.values.T if in_rows else self.values, map_position(places, half)).T
+        sides = np.moveaxis(self.values, -1 if in_rows else -2, 0)
+        return np.moveaxis(linear(sides, map_position(places, half)), 0, -1)
 
     def at(self, x: Array, y: Array) -> Array:
-        """Return the values at points x, y of one shape [m]."""
+        """Return the values at points x, y of one shape [m], of every map."""
         column, row = map_position(x, self.half_width), map_position(y, self.half_height)
         left, above = (np.minimum(a.astype(int), PLACES - 2) for a in (column, row))
         right, below = column - left, row - above
         upper, lower = (
-            self.values[line, left] * (1 - right) + self.values[line, left + 1] * right
+            self.values[..., line, left] * (1 - right) + self.values[..., line, left + 1] * right
             for line in (above, above + 1)
         )
         return np.asarray(upper * (1 - below) + lower * below)
@@ -130,17 +131,17 @@ def linear(values: Array, position: Array) -> Array:
     Parameters
     ----------
     values : Array
-        Table (rows, columns).
+        Table (rows, ...).
     position : Array
         Positions (n,), from 0 to the last row.
 
     Returns
     -------
     Array
-        Rows (n, columns).
+        Rows (n, ...).
     """
     index = np.minimum(position.astype(int), len(values) - 2)
-    part = (position - index).astype(values.dtype)[:, None]
+    part = (position - index).astype(values.dtype).reshape(-1, *[1] * (values.ndim - 1))
     return np.asarray(values[index] * (1 - part) + values[index + 1] * part)
 
 
@@ -272,7 +273,7 @@ def field_along(
     geometry: Geometry,
     frequency: Array,
     across: tuple[float, float],
-) -> list[tuple[Array, Map | None]]:
+) -> tuple[Array, Map]:
     """Return what a blur that changes over the field adds to waves in one direction, by place.
 
     Parameters
@@ -290,9 +291,10 @@ def field_along(
 
     Returns
     -------
-    list of tuple
-        Changes of the transfer (C, n), whose sum over all is that at a place [e/s], and the map of
-        the weight of each; None for 1.
+    changes : Array
+        Changes of the transfer (M, C, n), whose sum over all M is that at a place [e/s].
+    weights : Map
+        How much there is of each: M maps.
     """
     top = float(frequency[-1])
     coarse = np.linspace(0, top, len(frequency))
@@ -307,17 +309,17 @@ def field_along(
         return _between(table[0], frequency / top * (len(coarse) - 1))
 
     mean = np.mean([change[0].real for change in changes], axis=0)
-    found: list[tuple[Array, Map | None]] = [(at_frequencies(mean), None)]
+    tables, shares = [at_frequencies(mean)], [np.ones_like(azimuth)]
     for family, share in families:
         angle = family.order * direction
         turned = sum(
             (math.sin(angle) if is_sine else math.cos(angle)) * part
             for is_sine, part in family.turned(azimuth)
         )
-        table = at_frequencies(family.table(changes, share)) * (1j if family.order % 2 else 1)
-        around = np.tensordot(share, weights, 1) * turned
-        found.append((table, replace(maps[0], values=around)))
-    return found
+        table = family.table(changes, share) * (1j if family.order % 2 else 1)
+        tables.append(at_frequencies(table))
+        shares.append(np.tensordot(share, weights, 1) * turned)
+    return np.array(tables), replace(maps[0], values=np.array(shares))
 
 
 def ring_entries(rings: Sequence[Zone], size: TableSize) -> int:

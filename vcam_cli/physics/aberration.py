@@ -198,9 +198,8 @@ def otf_ratio_harmonics(
         (rest, wavelengths.tobytes()),
         lambda: pupil_harmonics.pupil_harmonics(rest, wavelengths, zernike.max_slope(rest)),
     )
-    return np.array(
-        [found.amplitudes(w * working_f_number * frequency, w) for w in wavelengths.tolist()]
-    )
+    h = np.multiply.outer(working_f_number * wavelengths, frequency)
+    return found.amplitudes(h, wavelengths)
 
 
 def has_few_waves(wavelengths: Floats, terms: Terms) -> bool:

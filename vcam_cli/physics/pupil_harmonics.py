@@ -49,26 +49,27 @@ class PupilHarmonics:
         """Memory that the coefficients take [bytes]."""
         return self.series.nbytes
 
-    def amplitudes(self, h: Array, wavelength: float) -> Array:
-        """Return the harmonics of a wavelength among or between the nodes'.
+    def amplitudes(self, h: Array, wavelengths: Array) -> Array:
+        """Return the harmonics of wavelengths among or between the nodes'.
 
         Parameters
         ----------
         h : ndarray
-            Frequencies (n,) over the cut-off of this wavelength [dimensionless].
-        wavelength : float
-            Wavelength [m].
+            Frequencies (J, n) over the cut-off of each wavelength [dimensionless].
+        wavelengths : ndarray
+            Wavelengths (J,) [m].
 
         Returns
         -------
         ndarray of complex
-            A_m (n, m) [dimensionless]; 0 from the cut-off on.
+            A_m (J, n, m) [dimensionless]; 0 from the cut-off on.
         """
-        series = np.tensordot(lagrange(self.wavenumbers, 1 / wavelength), self.series, axes=1)
+        series = np.tensordot(lagrange(self.wavenumbers, 1 / wavelengths), self.series, axes=1)
         inside = h < 1
-        at = np.polynomial.chebyshev.chebvander(2 * np.where(inside, h, 0.0) - 1, len(series) - 1)
+        degree = series.shape[1] - 1
+        at = np.polynomial.chebyshev.chebvander(2 * np.where(inside, h, 0.0) - 1, degree)
         parts = np.ascontiguousarray(series).view(np.float64)  # a real product takes a third
-        return ((at * inside[:, None]) @ parts).view(np.complex128)
+        return ((at * inside[..., None]) @ parts).view(np.complex128)
 
 
 def pupil_harmonics(terms: Terms, wavelengths: Array, slope: float) -> PupilHarmonics:
@@ -196,11 +197,10 @@ def _chebyshev(values: Array) -> Array:
     return coefficients
 
 
-def lagrange(nodes: Floats, at: float) -> Floats:
-    """Return the weights of values at nodes (n,) in the polynomial through them."""
-    weights = np.ones(len(nodes))
-    for i, own in enumerate(nodes):
-        for j, node in enumerate(nodes):
-            if i != j:
-                weights[i] *= (at - node) / (own - node)
+def lagrange(nodes: Floats, at: float | Floats) -> Floats:
+    """Return the weights of values at nodes (n,) in the polynomial through them (..., n)."""
+    others = np.subtract.outer(at, nodes)[..., None]  # (..., j, 1) beside nodes (i)
+    apart = np.subtract.outer(nodes, nodes).T
+    own = np.eye(len(nodes), dtype=bool)
+    weights: Floats = np.where(own, 1.0, others / np.where(own, 1.0, apart)).prod(axis=-2)
     return weights

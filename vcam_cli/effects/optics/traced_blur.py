@@ -149,7 +149,7 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
 
     def harmonics(self, frequency: Array, wavelengths: Array) -> Array:
         """Return the transfer (J, n, m) as harmonics of the direction, for the angle 0."""
-        shares = np.array([lagrange(self._nodes, 1 / w) for w in wavelengths.tolist()])
+        shares = lagrange(self._nodes, 1 / wavelengths)
         ends = [self.cutoff(w) for w in wavelengths.tolist()]
         nodes = self._harmonics_at_nodes(frequency)
         between = product(shares, nodes.reshape(len(nodes), -1).view(np.float64))

@@ -211,29 +211,25 @@ def _group_squares(path: OpticalPath, group: EdgeGroup, blur: Blur | FieldTransf
     count = math.ceil(4 * reach * top) + 1
     f = (np.arange(count) + 0.5) * (top / count)
     frequency = np.append(f, top)
-    parts: Sequence[tuple[Array, Map | None]] = []
-    mix = np.eye(weights.shape[1])
-    if blur is path.field:
-        parts = field_along(path.transfer, path.field_rings, g, frequency, group.across)
-    for uniform in of_kind([blur], Blur):
-        otf = uniform.spectral_otf_along(frequency, group.across, path.transfer.wavelengths)
-        if otf is None:
-            return None
-        # of one component all wavelengths are seen together
-        mix = weights[0] if len(weights) == 1 else np.eye(weights.shape[2])
-        parts = [(otf - 1, None)]
+    found = _added(path, blur, frequency, group.across)
+    if found is None:
+        return None
+    added, maps = found
+    # of one component all wavelengths are seen together
+    mix = weights[0] if len(weights) == 1 and maps is None else np.eye(added.shape[1])
     if len(weights) == 1:
         weights = np.eye(weights.shape[1])[None]
-    steps = np.tensordot(weights, group.heights, axes=(0, 0))  # (C, J, strips, n)
-    # of every edge by itself: (n, C strips, J) by (n, J, m)
-    each = np.ascontiguousarray(steps.transpose(3, 0, 2, 1))
-    each = each.reshape(steps.shape[3], -1, steps.shape[1])
-    change: Array = np.zeros(())
-    for added, weight in parts:
-        taken = _taken(path, group, f, mix @ added)
-        own = np.matmul(each, taken.transpose(1, 0, 2)).swapaxes(0, 1)
-        own = own.reshape(len(steps), steps.shape[2], *group.distances.shape)
-        change = change + (own if weight is None else own * _at_pixels(path, group, weight))
+    taken = _taken(path, group, f, mix @ added)
+    if maps is None:
+        seen = taken[:, :, 0].transpose(0, 2, 1)
+    else:
+        seen = np.einsum("nmrj,rtnm->njtm", taken, _at_pixels(path, group, maps))
+    count, places = group.distances.shape
+    steps = np.tensordot(group.heights, weights, axes=(0, 0))  # (strips, n, C, J)
+    # of every edge by itself: (n, strips C, J) by (n, J, t m), where only one of strips and t is many
+    each = np.ascontiguousarray(steps.swapaxes(0, 1)).reshape(count, -1, len(mix))
+    change = (each @ seen.reshape(count, len(mix), -1)).reshape(count, *steps.shape[::2], -1, places)
+    change = change.transpose(2, 1, 3, 0, 4).reshape(steps.shape[2], -1, count, places)
     size, strips = int(group.pixels.max()) + 1, change.shape[1]
     place = (size * np.arange(strips)[:, None] + group.pixels.ravel()).ravel()
     squares = np.zeros(len(change))
@@ -247,6 +243,21 @@ def _group_squares(path: OpticalPath, group: EdgeGroup, blur: Blur | FieldTransf
     return squares
 
 
+def _added(
+    path: OpticalPath, blur: Blur | FieldTransfer, frequency: Array, across: tuple[float, float]
+) -> tuple[Array, Map | None] | None:
+    """Return what a blur adds to waves in one direction (M, J, n), and how much there is of each.
+
+    A blur that is the same everywhere adds one change by wavelength, one over the field some by
+    color. None where a blur's transfer along one direction is not known by itself.
+    """
+    light = path.transfer
+    if not isinstance(blur, Blur):
+        return field_along(light, path.field_rings, path.geometry, frequency, across)
+    otf = blur.spectral_otf_along(frequency, across, light.wavelengths)
+    return None if otf is None else (otf[None] - 1, None)
+
+
 def _passed(path: OpticalPath, blur: Blur | FieldTransfer) -> float:
     """Return the frequency from which a blur passes nothing [cycles/m]."""
     if blur is path.field:
@@ -256,25 +267,26 @@ def _passed(path: OpticalPath, blur: Blur | FieldTransfer) -> float:
 
 
 def _taken(path: OpticalPath, group: EdgeGroup, f: Array, added: Array) -> Array:
-    """Return what is taken from edges of height 1 at pixels beside them (J, n, m).
+    """Return what is taken from edges of height 1 at pixels beside them (n, m, M, J).
 
-    `added` is H - 1 (J, k + 1) at the frequencies f (k,) and at their end.
+    `added` is H - 1 (M, J, k + 1) at the frequencies f (k,) and at their end.
     """
     g = path.geometry
     widths = np.abs([g.collecting_width, g.collecting_height]) * np.abs(group.across)
     aperture = np.sinc(f * widths[0]) * np.sinc(f * widths[1])
-    left = np.real(added[:, -1:])
+    left = np.real(added[..., -1:])
     distance = np.where(np.isfinite(group.distances), group.distances, 0.0)
-    parts = (added[:, :-1] - left) * aperture / (np.pi * f)
-    waves = _waves(parts, f, distance.ravel()).reshape(-1, *distance.shape)
+    parts = (added[..., :-1] - left) * aperture / (np.pi * f)
+    waves = _waves(parts.reshape(-1, len(f)), f, distance.ravel())
     box = half_plane_cover(distance, widths[:1], widths[1:]) - 0.5
-    taken: Array = np.multiply.outer(-left[:, 0], box) - waves
-    taken[:, ~np.isfinite(group.distances)] = 0
+    taken: Array = -np.multiply.outer(box, left[..., 0])
+    taken -= waves.reshape(taken.shape)
+    taken[~np.isfinite(group.distances)] = 0
     return taken
 
 
-def _at_pixels(path: OpticalPath, group: EdgeGroup, weight: Map) -> Array:
-    """Return a map at the pixels of a group (strips, n, m).
+def _at_pixels(path: OpticalPath, group: EdgeGroup, maps: Map) -> Array:
+    """Return maps at the pixels of a group (M, strips, n, m).
 
     Where one strip represents all lines, its rows are those of the map, between which it is
     straight, and with it the sum over all maps.
@@ -283,10 +295,10 @@ def _at_pixels(path: OpticalPath, group: EdgeGroup, weight: Map) -> Array:
     at, lines = (x, y) if group.in_rows else (y, x)
     along = at[group.pixels % len(at)]
     if group.counts[0] > 1:
-        found = weight.along(along.ravel(), group.in_rows)
-        return found.reshape(-1, *along.shape)
+        found = maps.along(along.ravel(), group.in_rows)
+        return found.reshape(*found.shape[:2], *along.shape)
     line = lines[group.pixels // len(at)]
-    return weight.at(*((along, line) if group.in_rows else (line, along)))[None]
+    return maps.at(*((along, line) if group.in_rows else (line, along)))[:, None]
 
 
 def _of_lines(path: OpticalPath, group: EdgeGroup, at_rows: Array) -> Array:
@@ -298,22 +310,21 @@ def _of_lines(path: OpticalPath, group: EdgeGroup, at_rows: Array) -> Array:
 
 
 def _waves(parts: Array, f: Array, places: Array) -> Array:
-    """Return the integrals (J, n) of Im[parts exp(2 pi i f u)] over f at places u (n,) [m].
+    """Return the integrals (n, J) of Im[parts exp(2 pi i f u)] over f at places u (n,) [m].
 
     `parts` are (J, k) at the midpoints f of k equal steps. At few places they are sums. At more, a
     transform gives them at places close together, straight lines between those all others.
     """
     step, count = 2 * f[0], scipy.fft.next_fast_len(FINER * len(f))
     if len(places) < count:
-        angle = 2 * np.pi * np.multiply.outer(f, places)
-        waves: Array = step * product(np.ascontiguousarray(parts.real), np.sin(angle))
+        angle = 2 * np.pi * np.multiply.outer(places, f)
+        waves: Array = step * product(np.sin(angle), np.ascontiguousarray(parts.real.T))
         if np.iscomplexobj(parts):
-            waves += step * product(np.ascontiguousarray(parts.imag), np.cos(angle))
+            waves += step * product(np.cos(angle), np.ascontiguousarray(parts.imag.T))
         return waves
     number = np.arange(count) - count // 2
     spectrum = np.zeros((len(parts), count), complex)
     spectrum[:, : len(f)] = parts * step
     sums = np.fft.fftshift(scipy.fft.ifft(spectrum, axis=1) * count, axes=1)
     table = np.imag(sums * np.exp(1j * np.pi * number / count))
-    at = number / (count * step)
-    return np.array([np.interp(places, at, line) for line in table])
+    return linear(np.ascontiguousarray(table.T), places * (count * step) + count // 2)
