@@ -128,6 +128,9 @@ class FakeDevice(Processor):
     def ifft(self, values, axis):
         return FakeArray(super().ifft(values.values, axis))
 
+    def irfft(self, values, count):
+        return FakeArray(super().irfft(values.values, count))
+
     def splines(self, values):
         return FakeArray(super().splines(values.values))
 

@@ -1,5 +1,7 @@
 """The cosine basis of an axis, against dense sums and exact boxes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.fft
@@ -90,6 +92,28 @@ def test_evaluation_equals_the_direct_sum(name, dtype, odd):
     np.testing.assert_allclose(got, direct, atol=1e-11 if dtype == np.float64 else 2e-5)
     columns = evaluated(along=0)
     np.testing.assert_allclose(columns, direct.T, atol=1e-11 if dtype == np.float64 else 2e-5)
+
+
+@pytest.mark.parametrize("name", AXES)
+@pytest.mark.parametrize("kinds", [(False,), (True,), (False, True)])
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_rows_that_are_displaced_see_the_direct_sum(name, kinds, dtype):
+    """By whole pixels and by less: waves beyond the Nyquist frequency fold in each row's way."""
+    rng = np.random.default_rng(2)
+    shifts = np.array([0.0, 0.31, -0.17, 1.0, -2.63])
+    axis = replace(AXES[name], row_shifts=shifts)
+    k = np.arange(axis.terms)
+    waves = {odd: rng.standard_normal((5, axis.terms)) / (1 + k) for odd in kinds}
+    position = axis.first + shifts[:, None] + np.arange(axis.pixels) * axis.pixel_pitch
+    angle = np.pi * np.multiply.outer(position, k) / axis.length
+    factor = np.where(k == 0, 1, 2)
+    direct = sum(
+        np.einsum("rk,rik->ri", factor * wave, (np.sin if odd else np.cos)(angle))
+        for odd, wave in waves.items()
+    )
+    got = axis.evaluate_rows({odd: wave.astype(dtype) for odd, wave in waves.items()}, shifts)
+    assert got.dtype == dtype
+    np.testing.assert_allclose(got, direct, atol=1e-11 if dtype == np.float64 else 2e-5)
 
 
 def test_photodetectors_off_center_need_no_chirp():

@@ -122,6 +122,11 @@ class Cuda(Processor):
         found: Array = self._cupy.fft.ifft(values, axis=axis)
         return found
 
+    def irfft(self, values: Array, count: int) -> Array:
+        """Return the sums (rows, count) of real waves whose spectra are (rows, count // 2 + 1)."""
+        found: Array = self._cupy.fft.irfft(values, count, axis=1, norm="forward")
+        return found
+
     def splines(self, values: Array) -> Array:
         """Return the coefficients of splines through an image that is mirrored."""
         from cupyx.scipy import ndimage

@@ -176,6 +176,11 @@ class Processor:
         found: Array = scipy.fft.ifft(values, axis=axis, overwrite_x=True)
         return found
 
+    def irfft(self, values: Array, count: int) -> Array:
+        """Return the sums (rows, count) of real waves whose spectra are (rows, count // 2 + 1)."""
+        found: Array = scipy.fft.irfft(values, count, axis=1, norm="forward", overwrite_x=True)
+        return found
+
     def splines(self, values: Array) -> Array:
         """Return the coefficients (rows, columns) of splines through an image that is mirrored."""
         from scipy import ndimage

@@ -24,8 +24,9 @@ it is a chirp-z transform, four times slower, which takes as much memory as ther
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, reduce
 
 import numpy as np
 import scipy.fft
@@ -37,6 +38,8 @@ NEAR = 1e-7
 """Distances below this are rounding errors [pixel pitches]."""
 CHIRP = 4
 """Cost of a chirp-z transform over that of a cosine transform of its length."""
+BLOCK = 64
+"""Terms whose turns are products of few: of one within a block, and of one for each block."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,15 +86,20 @@ class Axis:
 
     @cached_property
     def virtual_pixels(self) -> int | None:
-        """Whole number of pixels in the scene's length, where folding is exact; else None.
+        """Whole number of pixels in the scene's length, where folding is exact; else None."""
+        count = self._whole_pixels
+        if count is None or self.row_shifts is not None:
+            return None  # what one row cannot tell apart, another can
+        return count if 0 <= round(self._start) <= count - self.pixels else None
+
+    @cached_property
+    def _whole_pixels(self) -> int | None:
+        """Whole number of pixels in the scene's length, or None.
 
         It is None as well where so few of them are pixels that a chirp-z transform costs less.
         """
-        if self.row_shifts is not None:
-            return None  # what one row cannot tell apart, another can
-        count, first = round(self.length / self.pixel_pitch), round(self._start)
+        count = round(self.length / self.pixel_pitch)
         whole = abs(self.length / self.pixel_pitch - count) <= NEAR
-        whole = whole and 0 <= first <= count - self.pixels
         return count if whole and count <= CHIRP * (self.terms + self.pixels) else None
 
     @property
@@ -299,6 +307,50 @@ class Axis:
         full = self.device.dct3(values, axis, odd, overwrite)
         return full[self.window] if axis == 0 else full[:, self.window]
 
+    def evaluate_rows(self, waves: Mapping[bool, Array], shifts: Array) -> Array:
+        """Evaluate terms at photodetectors that are displaced along the axis, by row.
+
+        A cosine and a sine are the real part of one complex wave, which a displacement turns.
+
+        Parameters
+        ----------
+        waves : mapping
+            Cosines (False) and sines (True), or one of them: (rows, terms).
+        shifts : Array
+            Displacement of the photodetectors of every row (rows,) [m].
+
+        Returns
+        -------
+        Array
+            Values at the photodetectors (rows, pixels).
+        """
+        parts = [(-1j if odd else 1 + 0j) * wave for odd, wave in waves.items()]
+        turned: Array = reduce(np.add, parts)
+        count = self._whole_pixels
+        first = 0.0 if count is None else self.first
+        turn = (np.pi / self.length) * np.asarray(first + shifts)
+        fine, coarse = (
+            self.device.put(np.exp(1j * np.outer(turn, k)), turned.dtype)
+            for k in (np.arange(BLOCK), np.arange(0, self.terms, BLOCK))
+        )
+        for number, start in enumerate(range(0, self.terms, BLOCK)):
+            block = turned[:, start : start + BLOCK]
+            block *= fine[:, : block.shape[1]]
+            block *= coarse[:, number, None]
+        if count is None:
+            return self._chirp(turned, axis=1, odd=False)
+        # Waves beyond the pixels' Nyquist frequency fold onto the conjugate of others.
+        turned[:, 0] /= 2
+        half = self.device.zeros((len(turned), count + 1), turned.dtype)
+        for number, start in enumerate(range(0, self.terms, count)):
+            part = turned[:, start : start + count]
+            if number % 2 == 0:
+                half[:, : part.shape[1]] += part
+            else:
+                half[:, count : count - part.shape[1] : -1] += np.conjugate(part)
+        half[:, ::count] *= 2  # these two count once, all others twice
+        return self.device.irfft(half, 2 * count)[:, : self.pixels]
+
     @cached_property
     def _chirp_parts(self) -> tuple[int, Array, Array, Array]:
         """Transform length, chirp on the terms, kernel spectrum, chirp on the pixels."""
@@ -316,9 +368,7 @@ class Axis:
     def _chirp(self, values: Array, axis: int, odd: bool) -> Array:
         """Evaluate a sum of exponentials by Bluestein's algorithm: its real or imaginary part."""
         size, before, kernel, after = self._chirp_parts
-        kind: type[np.complexfloating] = (
-            np.complex64 if values.dtype == np.float32 else np.complex128
-        )
+        kind = np.result_type(values.dtype, np.complex64)
         shape = (-1, 1) if axis == 0 else (1, -1)
         count, padded = values.shape[axis], list(values.shape)
         padded[axis] = size

@@ -67,7 +67,7 @@ class Series:
         """
         parts = {odd: part[color, rows] for odd, part in self.parts.items()}
         if self.x.row_shifts is not None:
-            parts = self._shift_rows(parts, self.x.row_shifts[rows])
+            return self.x.evaluate_rows(parts, self.x.row_shifts[rows])
         found = [self.x.evaluate(part, axis=1, odd=odd) for odd, part in parts.items()]
         return found[0] if len(found) == 1 else found[0] + found[1]
 
@@ -78,17 +78,6 @@ class Series:
         colors = range(len(next(iter(self.parts.values()))))
         planes = [self.x.device.get(self.signal(color, slice(None))) for color in colors]
         return lambda color, rows: planes[color][rows]
-
-    def _shift_rows(self, parts: dict[bool, Array], shifts: Array) -> dict[bool, Array]:
-        """Return the waves of rows as photodetectors see them that are displaced by `shifts` [m].
-
-        cos(a + b) = cos a cos b - sin a sin b, sin(a + b) = sin a cos b + cos a sin b.
-        """
-        angle = 2 * np.pi * np.outer(*map(self.x.device.put, (shifts, self.x.frequencies)))
-        some = next(iter(parts.values()))
-        cosine, sine = np.cos(angle).astype(some.dtype), np.sin(angle).astype(some.dtype)
-        even, odd = (parts.get(kind, np.zeros_like(some)) for kind in (False, True))
-        return {False: even * cosine + odd * sine, True: odd * cosine - even * sine}
 
 
 @dataclass(frozen=True)

@@ -74,6 +74,7 @@ def view(
         pitch_x=geometry.pitch_x,
         pitch_y=geometry.pitch_y,
         margin=margin,
+        sampling_scale=geometry.sampling_scale,
         scene_width=geometry.scene_width_on_sensor,
         dtype=settings.dtype,
         cell_error=CELL_ERROR * settings.tolerance,

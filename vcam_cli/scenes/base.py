@@ -38,7 +38,9 @@ class View:
     margin: pixels that a chart goes on beyond the array on every side;
     scene_width: [m] on the sensor when the scene's extent has a width, None when the scene covers
     the array; dtype of planes; cell_error: what means over a chart's cells may err, rms of white;
-    covered: [m] width and height that a scene covers where a lens distorts, None for the array's.
+    covered: [m] width and height that a scene covers where a lens distorts, None for the array's;
+    sampling_scale: pitch of what photodetectors see over that of pixels, of which a chart is a
+    whole number long: its waves fold onto the pixels' then, which takes a quarter of the time.
     """
 
     rows: int
@@ -51,6 +53,7 @@ class View:
     dtype: DTypeLike = np.float64
     cell_error: float = 0.0
     covered: tuple[float, float] | None = None
+    sampling_scale: float = 1.0
 
     @property
     def width(self) -> float:
