@@ -123,7 +123,7 @@ def margin(
         if rms(np.add.outer(*both_axes)) <= budget:
             break
         pixels = math.ceil(1.25 * pixels)
-    return _fast(geometry, round(pixels * knobs.margin_scale))
+    return fast_margin(geometry, round(pixels * knobs.margin_scale))
 
 
 def _margin_part(knobs: Settings, overexposure: float) -> float:
@@ -224,10 +224,22 @@ def _periods() -> tuple[Array, Array]:
     return periods, (half * weight).ravel() * np.exp(-np.square(periods / 8) / 2)
 
 
-def _fast(geometry: Geometry, least: int) -> int:
-    """Return the smallest margin from `least` on at which transforms of both lengths are fast.
+def fast_margin(geometry: Geometry, least: int) -> int:
+    """Return the smallest margin at which transforms along both sides are fast.
 
     One whose transforms no machine has the memory for stays as it is.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Geometry of the array.
+    least : int
+        Pixels on every side that it has at least.
+
+    Returns
+    -------
+    int
+        Pixels on every side.
     """
     if least > LARGEST_TRANSFORM:
         return least
