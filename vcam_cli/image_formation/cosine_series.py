@@ -19,7 +19,9 @@ Evaluation: where S is a whole number of pixel pitches, terms that the pixels ca
 are folded onto each other and one DCT-III does it. Photodetectors off their pixels' centers see the
 cosines turned: each is some of the pixels' own cosine and some of the sine, folded by themselves
 (`pixel_waves`). Where S is no whole number of pixels, or far more than there are terms and pixels,
-it is a chirp-z transform, four times slower, which takes as much memory as there are terms.
+it is a chirp-z transform, four times slower, which takes as much memory as there are terms. Where
+every row of pixels is displaced by its own distance, cosines and sines are one complex wave, which
+is turned in each row: its real part is one transform of real numbers, of twice the length.
 """
 
 from __future__ import annotations
@@ -324,19 +326,17 @@ class Axis:
         Array
             Values at the photodetectors (rows, pixels).
         """
-        parts = [(-1j if odd else 1 + 0j) * wave for odd, wave in waves.items()]
-        turned: Array = reduce(np.add, parts)
         count = self._whole_pixels
         first = 0.0 if count is None else self.first
-        turn = (np.pi / self.length) * np.asarray(first + shifts)
+        angle = (np.pi / self.length) * np.asarray(first + shifts)
+        kind = np.result_type(next(iter(waves.values())).dtype, np.complex64)
         fine, coarse = (
-            self.device.put(np.exp(1j * np.outer(turn, k)), turned.dtype)
+            self.device.put(np.exp(1j * np.outer(angle, k)), kind)
             for k in (np.arange(BLOCK), np.arange(0, self.terms, BLOCK))
         )
-        for number, start in enumerate(range(0, self.terms, BLOCK)):
-            block = turned[:, start : start + BLOCK]
-            block *= fine[:, : block.shape[1]]
-            block *= coarse[:, number, None]
+        turns = (coarse[:, :, None] * fine[:, None]).reshape(len(shifts), -1)[:, : self.terms]
+        parts = [turns * (-1j * wave if odd else wave) for odd, wave in waves.items()]
+        turned: Array = reduce(np.add, parts)
         if count is None:
             return self._chirp(turned, axis=1, odd=False)
         # Waves beyond the pixels' Nyquist frequency fold onto the conjugate of others.

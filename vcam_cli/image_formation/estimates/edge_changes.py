@@ -228,7 +228,9 @@ def _group_squares(path: OpticalPath, group: EdgeGroup, blur: Blur | FieldTransf
     steps = np.tensordot(group.heights, weights, axes=(0, 0))  # (strips, n, C, J)
     # of every edge by itself: (n, strips C, J) by (n, J, t m), where only one of strips and t is many
     each = np.ascontiguousarray(steps.swapaxes(0, 1)).reshape(count, -1, len(mix))
-    change = (each @ seen.reshape(count, len(mix), -1)).reshape(count, *steps.shape[::2], -1, places)
+    change = (each @ seen.reshape(count, len(mix), -1)).reshape(
+        count, *steps.shape[::2], -1, places
+    )
     change = change.transpose(2, 1, 3, 0, 4).reshape(steps.shape[2], -1, count, places)
     size, strips = int(group.pixels.max()) + 1, change.shape[1]
     place = (size * np.arange(strips)[:, None] + group.pixels.ravel()).ravel()
