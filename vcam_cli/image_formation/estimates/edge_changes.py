@@ -23,7 +23,7 @@ import scipy.fft
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import pixel_centers
-from vcam_cli.effects.base import Effect, of_kind
+from vcam_cli.effects.base import Effect
 from vcam_cli.effects.blurs import Blur, FieldTransfer
 from vcam_cli.image_formation.field_dependence import Map, field_along, linear, map_position
 from vcam_cli.image_formation.optical_path import OpticalPath
@@ -226,7 +226,7 @@ def _group_squares(path: OpticalPath, group: EdgeGroup, blur: Blur | FieldTransf
         seen = np.einsum("nmrj,rtnm->njtm", taken, _at_pixels(path, group, maps))
     count, places = group.distances.shape
     steps = np.tensordot(group.heights, weights, axes=(0, 0))  # (strips, n, C, J)
-    # of every edge by itself: (n, strips C, J) by (n, J, t m), where only one of strips and t is many
+    # of every edge by itself: (n, strips C, J) by (n, J, t m); strips or t are one
     each = np.ascontiguousarray(steps.swapaxes(0, 1)).reshape(count, -1, len(mix))
     change = (each @ seen.reshape(count, len(mix), -1)).reshape(
         count, *steps.shape[::2], -1, places
