@@ -175,31 +175,35 @@ def field_mixtures(uniform_transfer: Transfer, rings: Sequence[Zone], size: Tabl
     def changes() -> list[Array]:
         frequency = np.linspace(0, size.top, JUDGED_HERE)
         count = len(uniform_transfer.weights)
-        some = rings[:: max(1, len(rings) // 4)]
-        found = [_change(uniform_transfer, ring.blur, frequency) for ring in some]
+        found = _changes(uniform_transfer, rings[:: max(1, len(rings) // 4)], frequency)
         return [np.moveaxis(c, 1, 0).reshape(count, -1).view(np.float64) for c in found]
 
     return mixtures(uniform_transfer, size, changes)
 
 
-def _change(uniform_transfer: Transfer, blur: Blur, frequency: Array) -> Array:
-    """Return what a blur adds to a transfer, by harmonics of the direction (m, K, C, n) [e/s].
+def _changes(uniform_transfer: Transfer, rings: Sequence[Zone], frequency: Array) -> list[Array]:
+    """Return what the blur of each ring adds to a transfer, by harmonics of the direction.
 
-    They are complex, see `direction_harmonics`. What depends on the direction is small: it is
-    computed at every second wavelength. The transfer is its radial part; its blurs with a direction
-    are `Tables.factors`.
+    They are complex (m, K, C, n) [e/s], see `direction_harmonics`. What depends on the direction is
+    small: it is computed at every second wavelength. The transfer is its radial part; its blurs
+    with a direction are `Tables.factors`.
     """
-    directed = of_kind([blur], PlaneTransfer)
-    if not directed:
-        whole = replace(uniform_transfer, effects=(*uniform_transfer.effects, blur))
-        change = whole.radial_response(frequency) - uniform_transfer.radial_response(frequency)
-        return change[None].astype(np.complex128)
     light = uniform_transfer.with_half_the_wavelengths()
-    change = np.moveaxis(directed[0].harmonics(frequency, light.wavelengths), -1, 1)
-    change = change * light.otf_radial(frequency)[:, None]
-    change[:, 0] -= light.otf_radial(frequency)
-    parts = np.stack([change.real, change.imag], axis=-1)
-    return np.moveaxis(light.spectral_sum(parts), 2, 0).copy().view(np.complex128)[..., 0]
+    before = light.otf_radial(frequency)
+
+    def change(blur: Blur) -> Array:
+        directed = of_kind([blur], PlaneTransfer)
+        if not directed:
+            whole = replace(uniform_transfer, effects=(*uniform_transfer.effects, blur))
+            added = whole.radial_response(frequency) - uniform_transfer.radial_response(frequency)
+            return added[None].astype(np.complex128)
+        harmonics = np.moveaxis(directed[0].harmonics(frequency, light.wavelengths), -1, 1)
+        added = harmonics * before[:, None]
+        added[:, 0] -= before
+        parts = np.stack([added.real, added.imag], axis=-1)
+        return np.moveaxis(light.spectral_sum(parts), 2, 0).copy().view(np.complex128)[..., 0]
+
+    return [change(ring.blur) for ring in rings]
 
 
 def tabulate_field(
@@ -239,7 +243,7 @@ def tabulate_field(
     uniform_transfer = uniform_transfer.with_mixtures(mix)
     base = radial_table(uniform_transfer, size)
     frequency = np.linspace(0, size.top, ring_entries(rings, size))
-    changes = [_change(uniform_transfer, ring.blur, frequency) for ring in rings]
+    changes = _changes(uniform_transfer, rings, frequency)
     level = np.abs(uniform_transfer.level).max() or 1.0
     families, left = _families(changes, size.tolerance * level)
     error += left / level
@@ -298,8 +302,7 @@ def field_along(
     """
     top = float(frequency[-1])
     coarse = np.linspace(0, top, len(frequency))
-    without = light.with_effects(())
-    changes = [_change(without, ring.blur, coarse) for ring in rings]
+    changes = _changes(light.with_effects(()), rings, coarse)
     families, _ = _families(changes, LEFT_ALONG * float(np.abs(light.level).max()))
     maps = zone_maps(rings, geometry)
     weights, azimuth = np.array([m.values for m in maps]), maps[0].azimuth

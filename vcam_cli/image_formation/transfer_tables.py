@@ -646,11 +646,12 @@ def _fewest(table: Array, allowed: float, most: int) -> Mixing:
     They are at most `most`, and else all of the K.
     """
     directions = np.linalg.eigh(product(table, table.T))[1].T[::-1]
-    for rank in range(1, len(table)):
-        mix = directions[:rank]
-        error = float(np.abs(mix.T @ (mix @ table) - table).max())
+    left = table.copy()
+    for rank, direction in enumerate(directions[:-1], start=1):
+        left -= np.outer(direction, direction @ left)
+        error = float(max(left.max(), -left.min()))
         if error <= allowed or rank == most:
-            return mix, error
+            return directions[:rank], error
     return np.eye(len(table)), 0.0
 
 
