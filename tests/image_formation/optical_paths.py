@@ -21,6 +21,7 @@ from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.pixel_response import scene_transfer
 from vcam_cli.image_formation.settings import STANDARD, Settings
 from vcam_cli.image_formation.transfer_functions import Transfer
+from vcam_cli.physics.pupil_harmonics import direction_harmonics
 from vcam_cli.scenes.base import Chart, ChartScene, Scene
 from vcam_cli.scenes.build import build
 from vcam_cli.scenes.framed import chart_scene
@@ -168,3 +169,12 @@ class Leaning(EndlessBlur, PlaneTransfer):
         ex = np.exp(-2 * (np.pi * self.along_x * fx) ** 2 - 2j * np.pi * fx * self.right)
         ey = np.exp(-2 * (np.pi * self.along_y * fy) ** 2 - 2j * np.pi * fy * self.down)
         return ey[:, None] * ex[None, :]
+
+    def harmonics(self, frequency, wavelengths):
+        def values(angles):
+            fx, fy = (np.multiply.outer(frequency, wave(angles)) for wave in (np.cos, np.sin))
+            wide = (self.along_x * fx) ** 2 + (self.along_y * fy) ** 2
+            found = np.exp(-2 * np.pi**2 * wide - 2j * np.pi * (fx * self.right + fy * self.down))
+            return np.broadcast_to(found, (len(wavelengths), *found.shape))
+
+        return direction_harmonics(values, 1e-12)

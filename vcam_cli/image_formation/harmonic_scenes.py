@@ -16,11 +16,18 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import pixel_centers
 from vcam_cli.effects.base import Effect, of_kind
-from vcam_cli.effects.blurs import Blur, FieldTransfer, SeparableTransfer
+from vcam_cli.effects.blurs import (
+    Blur,
+    FieldTransfer,
+    PlaneTransfer,
+    RadialTransfer,
+    SeparableTransfer,
+)
 from vcam_cli.image_formation.field_dependence import Map, zone_maps
 from vcam_cli.image_formation.optical_path import Layer, Layers, OpticalPath, SpectrumReport
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.image_formation.transfer_tables import PARITIES, split_by_parity
+from vcam_cli.physics.pupil_harmonics import in_directions
 from vcam_cli.scenes.base import HarmonicScene
 from vcam_cli.scenes.waves import Wave, WaveScene
 
@@ -86,13 +93,28 @@ def wave_layers(path: OpticalPath, scene: WaveScene) -> tuple[Layers, SpectrumRe
 
 
 def _zone_otfs(path: OpticalPath, wave: Wave) -> Array:
-    """Return the transfer (zones, J) of each zone's own blur; 1 where there is no zone."""
-    count = len(path.transfer.wavelengths)
+    """Return the transfer (zones, J) of each zone's own blur; 1 where there is no zone.
+
+    Zones are the rings, turned with the azimuth.
+    """
+    wavelengths = path.transfer.wavelengths
     if not path.zones or not (wave.fx or wave.fy):
-        return np.ones((1, count))
-    f = np.array([wave.fx]), np.array([wave.fy])
-    found = [path.transfer.with_effects([zone.blur]).otf(*f) for zone in path.zones]
-    return np.array(found).reshape(-1, count)
+        return np.ones((1, len(wavelengths)))
+    around = len(path.zones) // len(path.field_rings)
+    length, direction = math.hypot(wave.fx, wave.fy), math.atan2(wave.fy, wave.fx)
+    angles = direction - 2 * np.pi * np.arange(around) / around
+    found = []
+    for ring in path.field_rings:
+        frequency = np.array([0.0, length])
+        found += [
+            radial.spectral_otf(frequency, wavelengths)[None, :, 1]
+            for radial in of_kind([ring.blur], RadialTransfer)
+        ]
+        found += [
+            in_directions(directed.harmonics(frequency, wavelengths)[:, 1], angles).T
+            for directed in of_kind([ring.blur], PlaneTransfer)
+        ]
+    return np.concatenate(found)
 
 
 def _wave_levels(path: OpticalPath, effects: tuple[Effect, ...], wave: Wave, zones: Array) -> Array:

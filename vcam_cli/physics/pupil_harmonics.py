@@ -126,6 +126,26 @@ def direction_harmonics(values: Callable[[Floats], Array], left: float = LEFT_OF
         count *= 2
 
 
+def in_directions(harmonics: Array, angles: Floats) -> Array:
+    """Return a transfer function in some directions from its harmonics.
+
+    Parameters
+    ----------
+    harmonics : ndarray of complex
+        A_m (..., m) as those of `direction_harmonics`.
+    angles : ndarray
+        Directions (n,) [rad].
+
+    Returns
+    -------
+    ndarray of complex
+        Transfer (..., n) [dimensionless].
+    """
+    waves = np.exp(1j * np.multiply.outer(np.arange(harmonics.shape[-1]), angles))
+    even, odd = (harmonics[..., k::2] @ waves[k::2] for k in (0, 1))
+    return np.asarray(even.real + 1j * odd.imag)
+
+
 def _wavenumbers(wanted: Floats, slope: float) -> Floats:
     """Return Chebyshev nodes over the range of 1 / wavelength, or those wanted where it is few."""
     half = (wanted[-1] - wanted[0]) / 2

@@ -12,6 +12,7 @@ from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.blurs import Blur, PlaneTransfer, RadialTransfer
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.transfer_functions import Transfer
+from vcam_cli.physics.pupil_harmonics import in_directions
 
 TURNS = 2
 """Directions in half a turn over the highest harmonic: the largest contrast is known to 10 %."""
@@ -55,8 +56,6 @@ def _contrast(blur: Blur, before: Array, frequency: Array, wavelengths: Array) -
         )
     directed = of_kind([blur], PlaneTransfer)[0]
     parts = np.einsum("jn,jnm->nm", before, directed.harmonics(frequency, wavelengths))
-    orders = np.arange(parts.shape[1])
-    angles = np.arange(TURNS * len(orders)) * (np.pi / (TURNS * len(orders)))
-    waves = parts[:, :, None] * np.exp(1j * np.multiply.outer(orders, angles))
-    values = waves[:, ::2].real.sum(axis=1) + 1j * waves[:, 1::2].imag.sum(axis=1)
+    count = TURNS * parts.shape[1]
+    values = in_directions(parts, np.arange(count) * (np.pi / count))
     return np.asarray(np.abs(values).max(axis=1))

@@ -91,7 +91,7 @@ PLANES = 4
 """Mixtures that replace a scene's spectra, at most, as often as not."""
 PARITIES, MODES = 4, 4
 """Filters of a blur with a direction, and of one that changes over the field, about."""
-FIELD = 0.16
+FIELD = 0.08
 """Finding the modes of a blur over the field up to the Nyquist frequency of the pixels, and by its
 square up to another [s]."""
 MODE = 50e-9
