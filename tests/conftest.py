@@ -78,15 +78,12 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 def pytest_collection_finish() -> None:
     """Spare the garbage collector what collection has made: a sixth of the time of small tests.
 
-    Another 4 % are saved where it runs after 20,000 new objects in place of 700.
+    Another 4 % are saved where it runs after 20,000 new objects in place of 700. They stay frozen
+    to the end: pytest collects twice when it ends, which would take 4 s.
     """
     gc.freeze()
     gc.set_threshold(20_000)
     gc.enable()
-
-
-def pytest_unconfigure() -> None:
-    gc.unfreeze()
 
 
 @pytest.fixture(autouse=True)
