@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -62,7 +63,7 @@ class HalfPupil(AberrationBlur, GeometricTransfer):
         radius, side = abs(self.radius), self.half * math.copysign(1, self.radius)
         highest = max(np.abs(fx).max(initial=0.0), np.abs(fy).max(initial=0.0))
         # x = R sin t: no root at the rim. Gauss's rule needs some points for every wave across R.
-        node, weight = np.polynomial.legendre.leggauss(24 + math.ceil(8 * highest * radius))
+        node, weight = _gauss(24 + math.ceil(8 * highest * radius))
         t = (node + 1) * math.pi / 4
         x, h = radius * np.sin(t), radius * np.cos(t)
         share = weight * np.cos(t) ** 2  # sums to 1 over half a disk, but for rounding
@@ -70,6 +71,12 @@ class HalfPupil(AberrationBlur, GeometricTransfer):
         across = np.exp(-2j * np.pi * side * np.outer(x, fx))
         found: Array = (down @ across) / share.sum()
         return found
+
+
+@lru_cache(maxsize=32)
+def _gauss(points: int) -> tuple[Array, Array]:
+    """Return Gauss-Legendre nodes and weights: to find them takes longer than all the rest."""
+    return np.polynomial.legendre.leggauss(points)
 
 
 def halved(effects: Iterable[Effect], radius: float, half: int) -> tuple[Effect, ...]:
