@@ -91,6 +91,11 @@ class Module:
         """All nodes of the tree, walked once for all rules."""
         return tuple(ast.walk(self.tree))
 
+    @cached_property
+    def imports(self) -> tuple[tuple[int, str], ...]:
+        """(line, dotted name) of every import, inside functions and TYPE_CHECKING as well."""
+        return tuple((getattr(n, "lineno", 0), name) for n in self.nodes for name in imported(n))
+
 
 def sources() -> list[Module]:
     found = []
@@ -122,13 +127,6 @@ def imported(node: ast.AST) -> list[str]:
     return []
 
 
-def imports(module: Module) -> Iterator[tuple[int, str]]:
-    """(line, dotted name) of every import, inside functions and TYPE_CHECKING as well."""
-    for node in module.nodes:
-        for name in imported(node):
-            yield getattr(node, "lineno", 0), name
-
-
 def at_top(module: Module) -> Iterator[tuple[int, str]]:
     """(line, dotted name) of the imports that run when the module is imported."""
     queue: list[ast.AST] = [module.tree]
@@ -144,7 +142,7 @@ def at_top(module: Module) -> Iterator[tuple[int, str]]:
 def climbs(module: Module) -> list[str]:
     """Imports of a floor above, or beside, the module's own."""
     found = []
-    for line, name in imports(module):
+    for line, name in module.imports:
         if name.startswith("."):
             found.append(f"{module.name}:{line}: {name} is relative; write vcam_cli...")
         package, _, rest = name.partition(".")
@@ -162,7 +160,7 @@ def image_library(module: Module) -> list[str]:
     """Imports of OpenImageIO outside files/."""
     if module.room == "files":
         return []
-    return [f"{module.name}:{line}" for line, n in imports(module) if n.startswith("OpenImageIO")]
+    return [f"{module.name}:{line}" for line, n in module.imports if n.startswith("OpenImageIO")]
 
 
 def heavy(module: Module) -> list[str]:
@@ -178,7 +176,7 @@ def writes(module: Module) -> list[str]:
     calls = [node for node in module.nodes if isinstance(node, ast.Call)]
     found = [f"{module.name}:{c.lineno}: {ast.unparse(c)}" for c in calls if _writes(c)]
     names = {f"{owner}.{name}" for owner in ("os", "shutil") for name in WRITERS | OF_OS}
-    return found + [f"{module.name}:{line}: {n}" for line, n in imports(module) if n in names]
+    return found + [f"{module.name}:{line}: {n}" for line, n in module.imports if n in names]
 
 
 def _writes(call: ast.Call) -> bool:
@@ -419,7 +417,7 @@ def circle(modules: list[Module]) -> list[str]:
         if not module.name:
             continue
         own = graph.setdefault(f"vcam_cli.{module.name}", set())
-        for _, name in imports(module):
+        for _, name in module.imports:
             while name and name not in names:  # a name in a module, which is what is imported
                 name = name.rpartition(".")[0]
             own |= {name} - {"", f"vcam_cli.{module.name}"}
