@@ -6,7 +6,7 @@ from making import QUIET, camera, long_except, radiance_for
 
 from vcam_cli import characterize, plan, simulate
 from vcam_cli.camera.derived.geometry import geometry
-from vcam_cli.characterization import exposures
+from vcam_cli.characterization import bench, exposures
 from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.pixel.crosstalk import Crosstalk
 from vcam_cli.errors import BadInput
@@ -304,6 +304,7 @@ def test_the_bench_finds_the_mtf_with_crosstalk(pattern, tmp_path, monkeypatch):
     lens = {"optics.f_number": 8, "scene.radiance": radiance_for(5000), "array.pattern": pattern}
     colored = BAYER if pattern != "monochrome" else {}
     monkeypatch.setattr(exposures, "STACK", 4)  # of what is not judged here
+    monkeypatch.setattr(bench, "FIELD", 256)
     found = characterize(camera(tmp_path, {**colored, **blurs, **lens}))
     for channel in found.channels:
         sharp = found.get("mtf50", channel.color)
