@@ -227,6 +227,10 @@ def collectors(setup: Setup, room: float) -> Sequence[Collector | Rectangle | Pr
     return [Collector(plane, scene.outside, x0, y0, *sides) for plane in planes]
 
 
+DISPLACEMENTS = 64
+"""Displacements of the light by diffraction that are summed together."""
+
+
 def electrons_of_areas(setup: Setup) -> np.ndarray:
     """Mean photo-electrons of every pixel, of whatever is not waves: (rows, columns)."""
     off_x, off_y, width, height = setup.aperture
@@ -240,12 +244,14 @@ def electrons_of_areas(setup: Setup) -> np.ndarray:
     electrons = np.zeros(setup.color.shape)
     room = reach + abs(off_x) + abs(off_y) + width + height
     for sent, collector in zip(amount, collectors(setup, room), strict=True):
-        for n, (dx, dy) in enumerate(places):
+        for start in range(0, len(places), DISPLACEMENTS):
+            some = slice(start, start + DISPLACEMENTS)
+            dx, dy = places[some].T
             if setup.pixels is not None:
-                light = collector.at(x - dx, y - dy, width, height)
+                light = collector.at(x - dx[:, None, None], y - dy[:, None, None], width, height)
             else:
-                light = collector.inside(x[0] - dx, y[:, 0] - dy, width, height)
-            electrons += sent[:, n][setup.color] * light
+                light = collector.inside(x[0] - dx[:, None], y[:, 0] - dy[:, None], width, height)
+            electrons += np.einsum("yxn,nyx->yx", sent[:, :-1][:, some][setup.color], light)
         electrons += sent[:, -1][setup.color] * collector.far * width * height
     return electrons
 

@@ -40,10 +40,10 @@ class Rectangle:
         return float(math.isinf(self.left))
 
     def inside(self, x: np.ndarray, y: np.ndarray, width: float, height: float) -> np.ndarray:
-        """Area common to the rectangle and those centered at every (y, x): (m, n) [m2]."""
+        """Area common to the rectangle and those centered at every (y, x): (..., m, n) [m2]."""
         wide = np.minimum(x + width / 2, self.right) - np.maximum(x - width / 2, self.left)
         tall = np.minimum(y + height / 2, self.bottom) - np.maximum(y - height / 2, self.top)
-        return np.maximum(tall, 0)[:, None] * np.maximum(wide, 0)
+        return np.maximum(tall, 0)[..., :, None] * np.maximum(wide, 0)[..., None, :]
 
     def at(self, x: np.ndarray, y: np.ndarray, width: float, height: float) -> np.ndarray:
         """Area common to the rectangle and those centered at the points (x, y): their shape."""
@@ -63,9 +63,9 @@ class Product:
     def inside(self, x: np.ndarray, y: np.ndarray, width: float, height: float) -> np.ndarray:
         """Integral over the rectangles centered at every (y, x), eight Gauss points a side."""
         node, weight = np.polynomial.legendre.leggauss(8)
-        wide = self.across(x[:, None] + node * width / 2) @ weight
-        tall = self.down(y[:, None] + node * height / 2) @ weight
-        return np.outer(tall, wide) * width * height / 4
+        wide = self.across(x[..., None] + node * width / 2) @ weight
+        tall = self.down(y[..., None] + node * height / 2) @ weight
+        return tall[..., :, None] * wide[..., None, :] * width * height / 4
 
     def at(self, x: np.ndarray, y: np.ndarray, width: float, height: float) -> np.ndarray:
         """Integral over the rectangles centered at the points (x, y), of any shape: that shape."""
@@ -96,21 +96,17 @@ class Collector:
         self.far = float(plane.mean()) if outside == "mirror" else 0.0  # B far away
 
     def up_to(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Light above and to the left of every (y, x): (m, n) [m2]."""
-        u, v = (x - self.x0) / self.width, (y - self.y0) / self.height
-        i, j = np.floor(v).astype(int), np.floor(u).astype(int)
-        s, t = (v - i)[:, None], u - j
-        above = self.sum[np.ix_(i, j)] * (1 - t) + self.sum[np.ix_(i, j + 1)] * t
-        below = self.sum[np.ix_(i + 1, j)] * (1 - t) + self.sum[np.ix_(i + 1, j + 1)] * t
-        return above * (1 - s) + below * s
+        """Light above and to the left of every (y, x): (..., m, n) [m2]."""
+        return self.corner(x[..., None, :], y[..., :, None])
 
     def inside(self, x: np.ndarray, y: np.ndarray, width: float, height: float) -> np.ndarray:
-        """Integral of B over the rectangles centered at every (y, x): (m, n) [m2]."""
-        sides = np.concatenate([x - width / 2, x + width / 2])
-        rows = np.concatenate([y - height / 2, y + height / 2])
+        """Integral of B over the rectangles centered at every (y, x): (..., m, n) [m2]."""
+        sides = np.concatenate([x - width / 2, x + width / 2], axis=-1)
+        rows = np.concatenate([y - height / 2, y + height / 2], axis=-1)
         corner = self.up_to(sides, rows)
-        m, n = len(y), len(x)
-        return corner[m:, n:] - corner[:m, n:] - corner[m:, :n] + corner[:m, :n]
+        m, n = y.shape[-1], x.shape[-1]
+        lower, upper = corner[..., m:, :], corner[..., :m, :]
+        return lower[..., n:] - upper[..., n:] - lower[..., :n] + upper[..., :n]
 
     def corner(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Light above and to the left of the points (x, y), of any shape: that shape [m2]."""
