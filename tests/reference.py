@@ -248,10 +248,13 @@ def electrons_of_areas(setup: Setup) -> np.ndarray:
             some = slice(start, start + DISPLACEMENTS)
             dx, dy = places[some].T
             if setup.pixels is not None:
-                light = collector.at(x - dx[:, None, None], y - dy[:, None, None], width, height)
+                each = -1, *[1] * x.ndim
+                at = x - dx.reshape(each), y - dy.reshape(each)
+                light = collector.at(*at, width, height)
             else:
                 light = collector.inside(x[0] - dx[:, None], y[:, 0] - dy[:, None], width, height)
-            electrons += np.einsum("yxn,nyx->yx", sent[:, :-1][:, some][setup.color], light)
+            share = sent[:, :-1][:, some].T[:, setup.color]
+            electrons += np.einsum("n...,n...->...", share, light)
         electrons += sent[:, -1][setup.color] * collector.far * width * height
     return electrons
 
