@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from colour_demosaicing import demosaicing_CFA_Bayer_bilinear
 from demosaiced import bilinear
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -57,6 +56,8 @@ def test_equals_the_definition_up_to_the_border(order, shape):
 @pytest.mark.parametrize("order", ORDERS)
 def test_equals_colour_demosaicing_inside(order):
     """That package mirrors with the border pixel doubled, which changes the phase: inside only."""
+    from colour_demosaicing import demosaicing_CFA_Bayer_bilinear  # loads for a second
+
     mosaic = np.random.default_rng(4).random((30, 41))
     theirs = np.moveaxis(demosaicing_CFA_Bayer_bilinear(mosaic, order), 2, 0)
     ours = bilinear(mosaic, pattern_of(order), RGB)

@@ -258,7 +258,10 @@ def pair_sum(own: Setup, flats: list[Flat], count: int) -> np.ndarray:
         change = seen(flats, down, across) - _values(last.light, down[-1], across[-1], fills=True)
         between = 2 * np.abs(u * apart_x + v * apart_y)
         inside = apart_x**2 + apart_y**2 + between <= 1 - u**2 - v**2
-        total += inside * (_waves(fy, at_y) @ change @ _waves(fx, at_x).T)
+        rows, columns = inside.any(axis=1), inside.any(axis=0)  # few by rays near the rim
+        some = np.ix_(rows, columns)
+        sums = _waves(fy[rows], at_y) @ change @ _waves(fx[columns], at_x).T
+        total[some] += inside[some] * sums
         counted += inside
     # the mean over the middles; how many of them there are is left to the pupils' exact overlap
     share = np.where(fx > 0, 2, 1) / np.maximum(counted, 1) / math.prod(periods)
