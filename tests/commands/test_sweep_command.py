@@ -183,6 +183,8 @@ def test_ctrl_c_says_that_points_are_kept():
     )
     command = [sys.executable, "-m", "vcam_cli.commands.main", "sweep", "study.yaml"]
     root = str(Path(module.__file__).parents[2])
+    # Where a shell started the tests in the background, they ignore SIGINT, and so would the sweep.
+    former = signal.signal(signal.SIGINT, signal.default_int_handler)
     process = subprocess.Popen(
         [*command, "--workers", "2"],
         env=os.environ | {"PYTHONPATH": root},
@@ -190,6 +192,7 @@ def test_ctrl_c_says_that_points_are_kept():
         stderr=subprocess.PIPE,
         text=True,
     )
+    signal.signal(signal.SIGINT, former)
     until = time.monotonic() + 60
     while len(list(Path("out/study/points").glob("*.json"))) < 3 and time.monotonic() < until:
         time.sleep(0.005)
