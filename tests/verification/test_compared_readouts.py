@@ -103,11 +103,14 @@ def test_merged_codes_are_not_fitted(bench):
 
 @pytest.mark.parametrize("readout", long_except(["gain8", ""], ["gain1", "gain8", ""]))
 def test_the_camera_predicts_all_of_its_readouts(readout, bench):
-    """Means within 1 %, and no quantity of noise beyond the bound of its many, by three frames."""
+    """Means within 1 %, and no quantity of noise beyond the bound of its many.
+
+    Three frames of a gain find what six do; of merged codes six find a pattern that three miss.
+    """
     camera = load(bench / "two.yaml")
     tree = (bench / f"bench-{readout}.yaml").read_text()
-    (bench / f"three-{readout}.yaml").write_text(tree.replace("*", "[0-2]"))
-    file = measurement_file.read(bench / f"three-{readout}.yaml")
+    (bench / f"some-{readout}.yaml").write_text(tree.replace("*", "[0-2]") if readout else tree)
+    file = measurement_file.read(bench / f"some-{readout}.yaml")
     found = verify(camera, file)
     rows = [row for row in found.rows if row.quantity.startswith("mean")]
     assert len(rows) >= len(file.frames) >= 4
