@@ -217,16 +217,22 @@ def _end(g: Geometry, scene: LayeredScene) -> float:
 
 
 def _painted(path: OpticalPath, scene: LayeredScene, cells: Cells) -> list[RayLayer]:
-    """Return the layers that are seen on cells, the nearest first; none where one hides all."""
+    """Return the layers that are seen on cells, the nearest first; none where one hides all.
+
+    Of the nearest one the opacity alone is painted.
+    """
     edges, (side_x, side_y) = cells.edges(), cells.sides
     found: list[RayLayer] = []
     for part, optics in zip(scene.parts, path.layers, strict=True):
+        if not _meets(part, *edges):
+            continue
         level = path.transfer.level[part.components].T
         mix = np.zeros((len(level) + 1, level.shape[1] + 1), path.settings.dtype)
         mix[:-1, :-1], mix[-1, -1] = level, 1
-        if not _meets(part, *edges):
-            continue
-        planes = part.chart.crop_to_cells(*edges).averages(*edges, mix)
+        if found:
+            planes = part.chart.crop_to_cells(*edges).averages(*edges, mix)
+        else:
+            planes = part.chart.averages(*edges, mix[-1:])
         if not planes[-1].any():
             continue
         path_x, path_y, place_x, place_y = 0.0, 0.0, 0.0, 0.0

@@ -10,6 +10,7 @@ Their covariance is missing,
     C = K <L_1 + (1 - a_1) (L_2 + ...)> - (K <L_1> + (1 - K <a_1>) (K <L_2> + ...)),
 
 with the mean < > over rays, and K for what sharp lens, silicon and photodetector do to an image.
+The light L_1 of the nearest layer is in both and cancels: of it the opacity alone is looked up.
 
 Layers are known by their means over cells. Of such layers each ray has the exact value: it looks up
 the cells that it meets. Its errors are those of the size of the cells and of the number of
@@ -61,7 +62,8 @@ class RayLayer:
     """A layer as rays meet it. Lengths are in cells, along x and y."""
 
     planes: Array
-    """Light times opacity of every color, and opacity (C + 1, h, w)."""
+    """Light times opacity of every color, and opacity (C + 1, h, w); of the nearest layer opacity
+    alone will do (1, h, w)."""
     radius: tuple[float, float]
     """Radius of a point's blur; positive where the layer is nearer than what is in focus."""
     path: tuple[float, float] = (0.0, 0.0)
@@ -185,14 +187,15 @@ def covariance(
     Array
         Light (C, rows, columns) at the pixels, in the unit of the layers.
     """
-    colors, (rows, columns) = len(layers[0].planes) - 1, inner
-    dtype = layers[0].planes.dtype
+    colors, (rows, columns) = len(layers[-1].planes) - 1, inner
+    dtype = layers[-1].planes.dtype
     lights = [layer.planes[:-1] for layer in layers]
     clears = [1 - layer.planes[-1] for layer in layers[:-1]]
 
     def summed(rays: Array) -> Sums:
         offsets = [layer.offsets(rays) for layer in layers]
-        light = np.zeros((len(layers) + 1, colors, rows, columns), dtype)  # of all, and of each
+        # Of all that is seen behind the nearest layer, and of each that is there by itself.
+        light = np.zeros((len(layers), colors, rows, columns), dtype)
         clear = np.zeros((len(layers) - 1, rows, columns), dtype)
         seen: Array = np.empty((colors, rows, columns), dtype)
         for number in range(len(rays)):
@@ -200,14 +203,16 @@ def covariance(
             behind = lights[-1][:, *at[-1]]
             light[-1] += behind
             for k in range(len(layers) - 2, -1, -1):
-                own, passed = lights[k][:, *at[k]], clears[k][at[k]]
+                passed = clears[k][at[k]]
                 behind = np.multiply(behind, passed, out=seen)
-                behind += own
-                light[k + 1] += own
                 clear[k] += passed
+                if k:
+                    own = lights[k][:, *at[k]]
+                    behind += own
+                    light[k] += own
             light[0] += behind
         return rays, light, len(rays) - clear
 
-    (together, *alone), covers = seen(map(summed, groups))
+    (together, *alone), (nearest, *covers) = seen(map(summed, groups))
     means = list(zip(alone, [*covers, np.ones_like(together)], strict=True))
-    return np.asarray(together - front_to_back(means))
+    return np.asarray(together - (1 - nearest) * front_to_back(means))

@@ -243,7 +243,7 @@ class RaySum:
         seen = partial(self.sharp.at_pixels, cells)
         light = covariance(layers, groups, cells.inner, cells.met, seen)
         traced = sum(map(len, groups))
-        values = traced * len(layers) * len(layers[0].planes) * math.prod(cells.inner)
+        values = traced * sum(len(own.planes) for own in layers) * math.prod(cells.inner)
         return _Sum(cells.window, level, light.astype(dtype), values=values)
 
 
