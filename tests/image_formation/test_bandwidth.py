@@ -40,6 +40,7 @@ from vcam_cli.image_formation.estimates import (
 )
 from vcam_cli.image_formation.estimates.bandwidth import highest_passed, line_spread_tail, margin
 from vcam_cli.image_formation.light_plan import OMITTED_SHARE
+from vcam_cli.image_formation.optical_path import USED_SHARE
 from vcam_cli.image_formation.photon_rate import photo_rate
 from vcam_cli.image_formation.settings import STANDARD
 from vcam_cli.scenes.base import Chart
@@ -431,7 +432,7 @@ def test_the_shares_of_settings_and_omitted_effects_stay_within_the_tolerance():
     All shares that one frame can use at once, however rarely it does.
     """
     usual = bandwidth.MARGIN_SHARE, bandwidth.FREQUENCY_SHARE, chart_cells.CELLS_SHARE
-    assert math.hypot(*usual, OMITTED_SHARE) <= photon_rate.USED_SHARE
+    assert math.hypot(*usual, OMITTED_SHARE) <= USED_SHARE
     over_the_field = bandwidth.FIELD_SHARE, effect_changes.MODES_SHARE, far_field.MODES_SHARE
     others = scene_sampling.SINGLE_SHARE, warps.GROUPS_SHARE
     motion = sub_exposures.PLACE_SHARE, sub_exposures.INSTANT_SHARE

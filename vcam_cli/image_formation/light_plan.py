@@ -105,7 +105,9 @@ class LightPlan:
         on_axis = self.on_axis or 1.0
         transfer = replace(path.transfer, weights=path.transfer.weights / on_axis)
         full = min(path.full / on_axis, path.ceiling)
-        return replace(path, transfer=transfer, full=full) if self.omitted else path
+        if not self.omitted:
+            return path
+        return replace(path, transfer=transfer, full=full, omitted_share=self.share)
 
 
 def light_plan(path: OpticalPath, scene: AnyScene) -> LightPlan:

@@ -20,6 +20,10 @@ from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.transfer_functions import Transfer
 
 
+USED_SHARE = 0.95
+"""Part of the tolerance that all errors of the mean signal may use together."""
+
+
 @dataclass(frozen=True)
 class LayerOptics:
     """What acts on the light of one layer of a scene."""
@@ -81,6 +85,8 @@ class OpticalPath:
     by white on the axis; 0 where it is not known."""
     optional: tuple[Effect, ...] = ()
     """Effects that may be left out where the scene does not call for them."""
+    omitted_share: float = 0.0
+    """Bound on the rms change by effects that are left out, relative to full signal."""
     layers: tuple[LayerOptics, ...] = ()
     """What acts on each layer of a scene, the nearest first; () where it is seen as flat."""
     has_opacity: bool = False
@@ -120,6 +126,16 @@ class OpticalPath:
         Two standard errors of the squares of normal numbers.
         """
         return 1 + 2 * math.sqrt(2 / (self.geometry.rows * self.geometry.columns))
+
+    @property
+    def usable_error(self) -> float:
+        """Error that the light may have over all places, rms, relative to full signal.
+
+        Effects that are left out err below the frequencies that are lost: their squares add. Few
+        pixels may lose more than all places do on average.
+        """
+        used = USED_SHARE * self.settings.tolerance
+        return math.sqrt(max(used**2 - self.omitted_share**2, 0.0) / self.scatter)
 
     @property
     def judged_weights(self) -> Array:

@@ -31,9 +31,6 @@ from vcam_cli.rng import runs_of_blocks
 from vcam_cli.scenes.base import View
 from vcam_cli.scenes.layered import AnyScene
 
-USED_SHARE = 0.95
-"""Part of the tolerance that all errors of the mean signal may use together. Where the light turns
-out so much darker than assumed that they are more, it is computed again."""
 CELL_ERROR = 0.5
 """Error of the means over a chart's cells where edges meet, relative to white, over the tolerance.
 As cells are finer than the blur, pixels err by 0.07 tolerances by it at most: measured on leaves
@@ -123,11 +120,8 @@ def photo_rate(path: OpticalPath, scene: AnyScene, planes: bool = False) -> Rate
         with path.device.errors():
             found = _gathered(path, scene, planes)
         full = min(float(found.values.max(initial=0.0)), path.ceiling)
-        # Skipped effects err below the frequencies that are lost: their squares add. Few pixels may
-        # lose more than all places do on average.
-        lost = found.spectrum.lost_rms * math.sqrt(path.scatter)
-        error = math.hypot(lost, plan.share * full)
-        if full >= path.full or error <= USED_SHARE * path.settings.tolerance * full:
+        # Where the light is so much darker than assumed that it errs by more, it is computed again.
+        if full >= path.full or found.spectrum.lost_rms <= path.usable_error * full:
             return replace(found, plan=plan, spectrum=_with_place_error(path, found.spectrum))
         path = replace(path, full=full)
 

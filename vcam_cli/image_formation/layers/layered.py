@@ -136,7 +136,8 @@ def layered_image(
     light, bound = _composed(path, scene, layers)
     own = math.hypot(*(layer.lost_rms(g) for layer in layers))
     full = min(float(light.max(initial=0.0)), path.ceiling)
-    allowed = math.sqrt(max((tolerance * full) ** 2 - own**2, (RAYS_SHARE * tolerance * full) ** 2))
+    usable, least = path.usable_error * full, RAYS_SHARE * tolerance * full
+    allowed = math.sqrt(max(usable**2 - own**2, least**2))
     windows, left_out = windows_with(bound, LEFT_OUT * allowed)
     border, beyond = border_around(path, _end(g, scene), rms(bound), allowed)
     if any(map(moves_otherwise, path.layers)):  # at rest they would hide other light of each other
