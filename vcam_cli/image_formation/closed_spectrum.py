@@ -15,7 +15,7 @@ import scipy.fft
 
 from vcam_cli.arrays import Array
 from vcam_cli.image_formation.cosine_series import Axis
-from vcam_cli.image_formation.scene_spectrum import Index, SceneSpectrum, pairs
+from vcam_cli.image_formation.scene_spectrum import Index, Pair, SceneSpectrum, pairs
 from vcam_cli.parallel import AT_ONCE, PRODUCT, product, slices_within
 from vcam_cli.scenes.base import ChartScene
 from vcam_cli.scenes.cells import cell_edges
@@ -214,7 +214,9 @@ class DiscSpectrum:
             light += disc.height[plane] * disc.terms(index, slice(count))
         return light.astype(self.dtype)
 
-    def products(self, y: Array, x: Array, workers: int) -> Array:
+    def products(
+        self, y: Array, x: Array, workers: int, of: Sequence[Pair] | None = None
+    ) -> Array:
         """Return a bound on sums of products over blocks of terms: as if all were in phase.
 
         Parameters
@@ -223,22 +225,23 @@ class DiscSpectrum:
             Edges of the blocks, rising indices of terms along y and x.
         workers : int
             Number of threads.
+        of : sequence of Pair, optional
+            Pairs of planes; by default all `pairs`.
 
         Returns
         -------
         Array
-            Bounds (pairs, len(y) - 1, len(x) - 1), in the order of `scene_spectrum.pairs`.
+            Bounds (pairs, len(y) - 1, len(x) - 1), in the order of the pairs.
         """
-        every = self.even.products(y, x, workers)
+        squares = self.even.products(y, x, workers, [(r, r) for r in range(len(self))])
         of_discs = [disc.power(y, x) for disc in self.discs]
-        own = {}
-        for number, (r, s) in enumerate(pairs(len(self))):
-            if r == s:
-                amplitude = np.sqrt(np.maximum(every[number], 0))
-                for disc, power in zip(self.discs, of_discs, strict=True):
-                    amplitude = amplitude + abs(disc.height[r]) * np.sqrt(power)
-                own[r] = amplitude
-        return np.array([own[r] * own[s] for r, s in pairs(len(self))])
+        own = []
+        for r, square in enumerate(squares):
+            amplitude = np.sqrt(np.maximum(square, 0))
+            for disc, power in zip(self.discs, of_discs, strict=True):
+                amplitude = amplitude + abs(disc.height[r]) * np.sqrt(power)
+            own.append(amplitude)
+        return np.array([own[r] * own[s] for r, s in of or pairs(len(self))])
 
 
 def disc_waves(disc: LightDisc, scene: ChartScene, axes: Sequence[Axis]) -> DiscWaves:
@@ -310,7 +313,9 @@ class ProductSpectrum:
         """
         return product(self.along_y[index], self.along_x[plane, :, :count])
 
-    def products(self, y: Array, x: Array, workers: int) -> Array:
+    def products(
+        self, y: Array, x: Array, workers: int, of: Sequence[Pair] | None = None
+    ) -> Array:
         """Return sums of products of two planes' coefficients over blocks of terms.
 
         Parameters
@@ -319,11 +324,13 @@ class ProductSpectrum:
             Edges of the blocks, rising indices of terms along y and x.
         workers : int
             Number of threads.
+        of : sequence of Pair, optional
+            Pairs of planes; by default all `pairs`.
 
         Returns
         -------
         Array
-            Sums (pairs, len(y) - 1, len(x) - 1), in the order of `scene_spectrum.pairs`.
+            Sums (pairs, len(y) - 1, len(x) - 1), in the order of the pairs.
         """
         planes, runs, columns = self.along_x.shape
         in_rows = _sums_of_products(self.along_y.T, y).reshape(-1, runs**2)
@@ -331,7 +338,7 @@ class ProductSpectrum:
         in_columns = in_columns.reshape(-1, planes, runs, planes, runs)
         out = [
             product(in_rows, in_columns[:, r, :, s].reshape(-1, runs**2).T)
-            for r, s in pairs(planes)
+            for r, s in of or pairs(planes)
         ]
         return np.array(out)
 

@@ -9,7 +9,7 @@ share.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -18,7 +18,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.devices.processor import Processor
 from vcam_cli.image_formation.cosine_series import Axis
-from vcam_cli.image_formation.scene_spectrum import SceneSpectrum
+from vcam_cli.image_formation.scene_spectrum import Pair, SceneSpectrum
 from vcam_cli.image_formation.transfer_tables import PARITIES, TableReader, Tables, reader
 from vcam_cli.parallel import each, pieces, product, rows_at_once, slices_within
 
@@ -103,7 +103,9 @@ class _Ones:
         stop = -1 if index.stop is None else index.stop
         return int((stop - index.start) // index.step)
 
-    def products(self, y: Array, x: Array, workers: int) -> Array:
+    def products(
+        self, y: Array, x: Array, workers: int, of: Sequence[Pair] | None = None
+    ) -> Array:
         """Return nothing: a filter does not ask."""
         return np.zeros((1, len(y) - 1, len(x) - 1))
 

@@ -5,7 +5,7 @@ Planes of samples are transformed; charts in closed form are not sampled (`close
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement
 from typing import Protocol
@@ -21,6 +21,7 @@ from vcam_cli.scenes.bands import bands_of_rows, paint_by_bands
 from vcam_cli.scenes.base import ChartScene
 
 Index = Array | slice
+Pair = tuple[int, int]
 COPIED = 1 << 23
 """Values of a plane that are copied to a device together."""
 
@@ -52,7 +53,9 @@ class SceneSpectrum(Protocol):
             Coefficients (n, count).
         """
 
-    def products(self, y: Array, x: Array, workers: int) -> Array:
+    def products(
+        self, y: Array, x: Array, workers: int, of: Sequence[Pair] | None = None
+    ) -> Array:
         """Return sums of products of two planes' coefficients over blocks of terms.
 
         Parameters
@@ -61,15 +64,17 @@ class SceneSpectrum(Protocol):
             Edges of the blocks along each axis, rising from 0.
         workers : int
             Number of threads; the result does not depend on it.
+        of : sequence of Pair, optional
+            Pairs of planes; by default all `pairs`.
 
         Returns
         -------
         Array
-            Sums (pairs, blocks along y, blocks along x) of all `pairs`, in 64 bits.
+            Sums (pairs, blocks along y, blocks along x), in 64 bits.
         """
 
 
-def pairs(planes: int) -> list[tuple[int, int]]:
+def pairs(planes: int) -> list[Pair]:
     """Return the pairs (r, s), r <= s, of planes.
 
     Parameters
@@ -119,7 +124,9 @@ class SampledSpectrum:
         """
         return self.coefficients[plane, index, :count]
 
-    def products(self, y: Array, x: Array, workers: int) -> Array:
+    def products(
+        self, y: Array, x: Array, workers: int, of: Sequence[Pair] | None = None
+    ) -> Array:
         """Return sums of products of two planes' coefficients over blocks of terms.
 
         Parameters
@@ -128,16 +135,18 @@ class SampledSpectrum:
             Edges of the blocks, rising indices of terms along y and x.
         workers : int
             Number of threads.
+        of : sequence of Pair, optional
+            Pairs of planes; by default all `pairs`.
 
         Returns
         -------
         Array
-            Sums (pairs, len(y) - 1, len(x) - 1), in the order of `pairs`.
+            Sums (pairs, len(y) - 1, len(x) - 1), in the order of the pairs.
         """
-        every = pairs(len(self))
+        every = of or pairs(len(self))
         return np.array([self._pair_products(pair, y, x, workers) for pair in every])
 
-    def _pair_products(self, pair: tuple[int, int], y: Array, x: Array, workers: int) -> Array:
+    def _pair_products(self, pair: Pair, y: Array, x: Array, workers: int) -> Array:
         first, second = (self.coefficients[plane, :, : x[-1]] for plane in pair)
         out = np.empty((len(y) - 1, len(x) - 1))
 
@@ -160,7 +169,7 @@ class DeviceSpectrum(SampledSpectrum):
 
     device: Processor
 
-    def _pair_products(self, pair: tuple[int, int], y: Array, x: Array, workers: int) -> Array:
+    def _pair_products(self, pair: Pair, y: Array, x: Array, workers: int) -> Array:
         first, second = (self.coefficients[plane, : y[-1], : x[-1]] for plane in pair)
         members = [
             self.device.put(np.repeat(np.eye(len(edges) - 1), np.diff(edges), axis=0), self.dtype)

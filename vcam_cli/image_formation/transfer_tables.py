@@ -19,6 +19,7 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.effects.blurs import Blur, GeometricTransfer, PlaneTransfer
+from vcam_cli.image_formation.scene_spectrum import Pair, pairs
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.parallel import product, slices_within
 from vcam_cli.physics.cache import ByteCache
@@ -157,10 +158,21 @@ class Tables:
         return self.shape[1]
 
     @cached_property
+    def seen(self) -> Array:
+        """Which mixtures each color sees (R, C)."""
+        parts = [part for part in (self.radial, *self.planes) if part is not None]
+        return np.any([part.reshape(*self.shape, -1).any(axis=2) for part in parts], axis=0)
+
+    @property
+    def pairs(self) -> list[Pair]:
+        """Mixtures that a color sees together, and each with itself."""
+        together = self.seen @ self.seen.T
+        return [(r, s) for r, s in pairs(len(together)) if r == s or together[r, s]]
+
+    @cached_property
     def planes_by_color(self) -> list[tuple[Array, slice]]:
         """Mixtures (n,) that consecutive colors see, and these colors; none that see nothing."""
-        parts = [part for part in (self.radial, *self.planes) if part is not None]
-        seen = np.any([part.reshape(*self.shape, -1).any(axis=2) for part in parts], axis=0)
+        seen = self.seen
         starts = np.flatnonzero(np.append(True, (seen[:, 1:] != seen[:, :-1]).any(axis=0)))
         spans = zip(starts, np.append(starts[1:], self.colors), strict=True)
         found = ((np.flatnonzero(seen[:, a]), slice(int(a), int(b))) for a, b in spans)
@@ -307,9 +319,9 @@ class PartReader:
     """Tables of one parity, interpolated."""
 
     tables: Tables
-    radial: tuple[Array, Array] | None
-    """Entries over |f| (R, C, entries) and the steps to the next; None where this parity has no
-    radial part."""
+    radial: tuple[Array, Array, Array] | None
+    """Entries over |f| (n, entries) of the tables that are not 0, the steps to the next, and which
+    they are (R C,); None where this parity has no radial part."""
     plane: Array | None
     """Spline coefficients (R, C, m, m) over fy and fx, where there is such a part."""
     spline_x: Any
@@ -332,13 +344,16 @@ class PartReader:
     def radial_values(self, fx: Array, fy: Array) -> Array:
         """Return the part over |f| at frequencies (n,) and (m,); its end holds beyond it."""
         assert self.radial is not None
-        tables, (entries, steps) = self.tables, self.radial
+        tables, (entries, steps, lit) = self.tables, self.radial
         last = steps.shape[-1]
         position = np.minimum(np.hypot(fx, fy[:, None]).ravel() * (last / tables.top), last)
         index = np.minimum(position.astype(np.intp), last - 1)
         values = steps.take(index, axis=-1)
         values *= position - index
         values += entries.take(index, axis=-1)
+        if not lit.all():  # of a layer half of them are 0: its light has none of its opacity
+            some, values = values, np.zeros((len(lit), len(index)))
+            values[lit] = some
         shaped: Array = values.reshape(*tables.shape, len(fy), len(fx))
         if tables.order:
             angle = tables.order * np.arctan2(fy[:, None], fx)
@@ -374,7 +389,9 @@ def reader(tables: Tables, parity: int, fx: Array) -> TableReader:
 def _part_reader(tables: Tables, parity: int, fx: Array) -> PartReader:
     plane, radial = tables.planes[parity], None
     if parity == tables.radial_parity:
-        radial = tables.radial, np.diff(tables.radial)
+        every = tables.radial.reshape(-1, tables.radial.shape[-1])
+        lit = every.any(axis=1)
+        radial = every[lit], np.diff(every[lit]), lit
     if plane is None:
         return PartReader(tables, radial, None, None)
     spline = spline_weights(plane.shape[-1], fx / tables.top)

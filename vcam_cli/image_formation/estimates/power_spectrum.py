@@ -17,7 +17,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.effects.blurs import SeparableTransfer
 from vcam_cli.image_formation.cosine_series import Axis
-from vcam_cli.image_formation.scene_spectrum import SceneSpectrum, pairs
+from vcam_cli.image_formation.scene_spectrum import Pair, SceneSpectrum, pairs
 from vcam_cli.image_formation.transfer_tables import Tables, reader
 from vcam_cli.parallel import product
 
@@ -106,7 +106,8 @@ class PowerSpectrum:
     y: Blocks
     products: Array
     """(pairs, blocks along y, blocks along x) of planes (r, s), r <= s, twice where they differ."""
-    planes: int
+    pairs: Sequence[Pair]
+    """Those planes: all that any color sees together."""
     separable: tuple[SeparableTransfer, ...]
 
     def filtered_power(self, tables: Tables) -> Array:
@@ -140,8 +141,9 @@ class PowerSpectrum:
         power = np.zeros((tables.colors, len(self.y.low), len(self.x.low)))
         for parity in tables.parities:
             values = _at_centers(tables, parity, self.x, self.y)
-            for (r, s), squares in zip(pairs(self.planes), self.products, strict=True):
-                power += values[r] * values[s] * squares
+            for (r, s), squares in zip(self.pairs, self.products, strict=True):
+                both = tables.seen[r] & tables.seen[s]
+                power[both] += values[r, both] * values[s, both] * squares
         return np.maximum(power, 0)
 
     def pixel_power(self, power: Array) -> Array:
@@ -175,7 +177,7 @@ class PowerSpectrum:
             Mean squares (C, blocks along y, blocks along x) [(e/s)^2].
         """
         values = np.abs(_at_centers(tables, 0, self.x, self.y))
-        own = [p for (r, s), p in zip(pairs(self.planes), self.products, strict=True) if r == s]
+        own = [p for (r, s), p in zip(self.pairs, self.products, strict=True) if r == s]
         amplitudes = values * np.sqrt(np.maximum(own, 0))[:, None]
         return self.pixel_power(np.square(amplitudes.sum(axis=0)))
 
@@ -306,6 +308,7 @@ def power_spectrum(
     y: Axis,
     separable: Sequence[SeparableTransfer],
     workers: int,
+    of: Sequence[Pair] | None = None,
 ) -> PowerSpectrum:
     """Return the power spectrum of planes up to the highest terms of the axes.
 
@@ -319,6 +322,8 @@ def power_spectrum(
         Transfer functions along the axes.
     workers : int
         Number of threads; the result does not depend on it.
+    of : sequence of Pair, optional
+        Pairs of planes that a color sees together; by default all.
 
     Returns
     -------
@@ -327,9 +332,10 @@ def power_spectrum(
     """
     along_x, along_y = blocks(x), blocks(y)
     products = []
-    sums = spectrum.products(along_y.edges, along_x.edges, workers)
-    for (r, s), of_pair in zip(pairs(len(spectrum)), sums, strict=True):
+    every = of or pairs(len(spectrum))
+    sums = spectrum.products(along_y.edges, along_x.edges, workers, every)
+    for (r, s), of_pair in zip(every, sums, strict=True):
         twice = 1 if r == s else 2
         squares = product(along_y.weights, product(of_pair, along_x.weights.T))
         products.append(twice * squares)
-    return PowerSpectrum(along_x, along_y, np.array(products), len(spectrum), tuple(separable))
+    return PowerSpectrum(along_x, along_y, np.array(products), every, tuple(separable))

@@ -151,7 +151,7 @@ def sampled_image(
     tables = tabulate(exact.with_effects(exact.radial_blurs), size, mixing)
     scene, spectrum, peak = _scene_spectrum(path, scene, highest, mixing[0])
     x, y = axes(path, scene, highest)
-    power = power_spectrum(spectrum, x, y, path.separable, path.workers)
+    power = power_spectrum(spectrum, x, y, path.separable, path.workers, tables.pairs)
     lens_power = power.lens_power(tables)
     directed = (*exact.plane_blurs, *(ring.blur for ring in path.field_rings))
     squares = (
