@@ -59,30 +59,43 @@ class MaskedChart(Chart):
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
         """Write the averages over the cells: exact, since samples of opacity divide them."""
         out[:] = 0
-        (columns, across, x_inside), (rows, down, y_inside) = self.opacity.inside(x_edges, y_edges)
+        (columns, across, x), (rows, down, y) = self.opacity.inside(x_edges, y_edges)
         if not len(across) or not len(down):
             return
-        x, y, even = x_inside, y_inside, self.opacity.is_even
+        covered = out[:, rows, columns]
+        if self.opacity.is_even:
+            self._paint_light(x, y, mix, covered)
+            covered *= self.opacity.picture[0, 0].astype(mix.dtype)
+        else:
+            self._paint_divided(x, y, mix, covered)
+        rim_y, rim_x = (np.flatnonzero(part != 1) for part in (down, across))
+        covered[:, rim_y] *= down[rim_y, None]
+        covered[..., rim_x] *= across[rim_x]
+
+    def _paint_light(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
+        """Write the light of cells that the layer covers as if its opacity were 1."""
         lit = np.flatnonzero(mix[:, :-1].any(axis=1))  # opacity alone has no light to paint
-        if not even:
-            borders = self.opacity.sample_borders(x, y)
-            x, y = (_with_borders(*both) for both in zip((x, y), borders, strict=True))
-        middle, first = (x[1:] + x[:-1]) / 2, np.searchsorted(y, y_inside)
-        few = max(1, len(down) * MOST_PARTS // ((len(x) - 1) * (len(y) - 1)))
-        for some in pieces(len(down), few):
+        count = lit[-1] + 1 if len(lit) else 0
+        if count:
+            self.light.paint(x_edges, y_edges, mix[:count, :-1], out[:count])
+        out[count:] = 0
+        for plane in np.flatnonzero(mix[:, -1]):
+            out[plane] += mix[plane, -1]
+
+    def _paint_divided(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
+        """Write the averages over cells within the frame, divided by the samples of opacity."""
+        borders = self.opacity.sample_borders(x_edges, y_edges)
+        x, y = (_with_borders(*both) for both in zip((x_edges, y_edges), borders, strict=True))
+        middle, first = (x[1:] + x[:-1]) / 2, np.searchsorted(y, y_edges)
+        rows = out.shape[1]
+        few = max(1, rows * MOST_PARTS // ((len(x) - 1) * (len(y) - 1)))
+        for some in pieces(rows, few):
             here = y[first[some.start] : first[some.stop] + 1]
-            seen = np.tile(mix[:, -1, None, None], (1, len(here) - 1, len(x) - 1))
-            if len(lit):
-                for plane, light in zip(
-                    lit, self.light.averages(x, here, mix[lit, :-1]), strict=True
-                ):
-                    seen[plane] += light
-            at = slice(1) if even else slice(None)
+            seen = np.empty((len(mix), len(here) - 1, len(x) - 1), mix.dtype)
+            self._paint_light(x, here, mix, seen)
             between = (here[1:] + here[:-1]) / 2
-            seen *= self.opacity.values(middle[at], between[at], np.ones((1, 1), mix.dtype))
-            found = means_of_parts(seen, (here, x), (_edges(y_inside, some), x_inside))
-            found *= np.outer(down[some], across).astype(mix.dtype)
-            out[:, rows, columns][:, some] = found
+            seen *= self.opacity.values(middle, between, np.ones((1, 1), mix.dtype))
+            out[:, some] = means_of_parts(seen, (here, x), (_edges(y_edges, some), x_edges))
 
     def sample_borders(self, x_edges: Array, y_edges: Array) -> tuple[Array, Array]:
         """Return where light or opacity may change within cells."""
