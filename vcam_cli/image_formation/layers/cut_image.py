@@ -27,7 +27,7 @@ from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.blurs import Blur, SeparableTransfer
 from vcam_cli.effects.optics.paraboloid import Paraboloid
 from vcam_cli.effects.optics.wavefront_blur import AberrationBlur
-from vcam_cli.image_formation.layers.layered import PART, gathered, is_of_lens
+from vcam_cli.image_formation.layers.layered import gathered, is_of_lens
 from vcam_cli.image_formation.layers.ray_composition import composed, ray_correction
 from vcam_cli.image_formation.optical_path import (
     CutReport,
@@ -44,6 +44,9 @@ PLANES = 10
 """Values of every pixel and color that are kept at once."""
 FormImage = Callable[[OpticalPath, CutLayer | SlopeLayer], tuple[Layers, SpectrumReport]]
 """What forms the image of a flat scene."""
+
+PART = 0.5
+"""Part of the tolerance that the images of all cuts may use together."""
 
 
 def cut_image(

@@ -61,8 +61,8 @@ FormImage = Callable[[OpticalPath, ChartScene | ImageScene], tuple[Layers, Spect
 RAYS_SHARE = 0.4
 """Part of the tolerance that the covariance may err, at least; more where the layers' own images
 err less."""
-PART = 0.5
-"""Part of the tolerance that the image of each layer may use."""
+OWN_SHARE = 0.85
+"""Part of the tolerance that the images of all layers may use together, each by its area."""
 
 WIDEST = 4
 """Arrays that a layer's chart goes on beyond the array, at most. A lens at f/10000 throws light
@@ -164,10 +164,11 @@ def layered_image(
 def _layers_seen(path: OpticalPath, scene: LayeredScene, form: FormImage) -> Iterator[SeenLayer]:
     """Yield the layers that the array sees, the nearest first."""
     behind = tuple(e for e in of_kind(path.effects, Blur, SeparableTransfer) if not is_of_lens(e))
+    share = OWN_SHARE / math.sqrt(_layers_over_array(path.geometry, scene))
     for number, (part, optics) in enumerate(zip(scene.parts, path.layers, strict=True)):
         effects = (*(e for e in optics.effects if is_of_lens(e)), *behind)
         hides = part is not scene.parts[-1]
-        seen = _layer_path(path, part, effects, scene.brightest, hides)
+        seen = _layer_path(path, part, effects, scene.brightest, hides, share)
         if seen is not None:
             window, own, beyond, is_cut = seen
             center = window.center(path.geometry)
@@ -284,19 +285,31 @@ def gathered(
     return out
 
 
+def _layers_over_array(g: Geometry, scene: LayeredScene) -> float:
+    """Return the area of all layers on the array over its own; 1 where they are less."""
+    pixels = sum(math.prod(_window(g, part, 0.0).pixels) for part in scene.parts)
+    return max(pixels / (g.rows * g.columns), 1.0)
+
+
 def _layer_path(
-    path: OpticalPath, part: LayerPart, effects: tuple[Effect, ...], brightest: float, hides: bool
+    path: OpticalPath,
+    part: LayerPart,
+    effects: tuple[Effect, ...],
+    brightest: float,
+    hides: bool,
+    share: float,
 ) -> tuple[Window, OpticalPath, int, bool] | None:
     """Return where a layer is seen, and the path of its light; None where it is beside the array.
 
     Of a layer that hides others the path has twice the colors: those of the light, and of the
-    opacity in light as bright as the scene's brightest, relative to white. The third value are the
-    pixels by which its chart is to go on beyond the window, the last one whether they are too few.
+    opacity in light as bright as the scene's brightest, relative to white. `share` is the part of
+    the tolerance that it may use. The third value are the pixels by which its chart is to go on
+    beyond the window, the last one whether they are too few.
     """
     g = path.geometry
     # Opacity counts as the scene's brightest light, which may lie behind it; no light is cut.
     level = brightest * float(path.transfer.level[-1].max())
-    tolerance = PART * path.settings.tolerance * min(1.0, path.ceiling / (level or 1.0))
+    tolerance = share * path.settings.tolerance * min(1.0, path.ceiling / (level or 1.0))
     knobs = replace(path.settings, tolerance=tolerance)
     band = float(path.transfer.wavelengths[0]), float(path.transfer.wavelengths[-1])
     wanted = margin(g, effects, band, knobs)

@@ -91,7 +91,7 @@ GROWTH = 4
 """Values that a level takes over those of all before it, about."""
 LEFT_OUT = 0.3
 """Part of what is allowed that windows left out may have, by their bound."""
-BEYOND = 0.3
+BEYOND = 0.4
 """Part of what is allowed that light which diffracts from beyond a window's border may have."""
 WIDEST_BORDER = 12
 """Pixels of such a border, at most: the predicted error includes what a narrower one leaves."""
