@@ -278,9 +278,10 @@ def gathered(
     out: Array = np.zeros((len(like), g.rows, g.columns), like.dtype)
     columns, rows = pixel_centers(g)
     for layer in layers:
-        weight = 1.0 if layer.weight is None else layer.weight(columns + at[0], rows + at[1])
+        weight = None if layer.weight is None else layer.weight(columns + at[0], rows + at[1])
         for color, plane in enumerate(out):
-            plane += layer.values(color, slice(0, g.rows)) * weight
+            found = layer.values(color, slice(0, g.rows))
+            plane += found if weight is None else found * weight
         del layer  # its series is not held beside the next one
     return out
 
