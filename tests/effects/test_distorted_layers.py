@@ -208,7 +208,7 @@ def test_layers_seen_through_a_map_cost_the_cells_that_are_painted():
     for lens, painted in (["optics.distortion={k1: -0.1}"], True), ([], False):
         spectrum = simulate(load("table-top", [*lens, *FEWER])).frame.spectrum
         parts = [own for *_, own in spectrum.parts]
-        assert len(parts) == 4
+        assert len(parts) == (4 if painted else 3)  # one lies beside so small an array
         for own in parts:
             assert own.warped_cells == (own.cells if painted else 0)
             assert own.cells > 0 or not painted
