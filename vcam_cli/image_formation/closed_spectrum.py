@@ -214,9 +214,7 @@ class DiscSpectrum:
             light += disc.height[plane] * disc.terms(index, slice(count))
         return light.astype(self.dtype)
 
-    def products(
-        self, y: Array, x: Array, workers: int, of: Sequence[Pair] | None = None
-    ) -> Array:
+    def products(self, y: Array, x: Array, workers: int, of: Sequence[Pair] | None = None) -> Array:
         """Return a bound on sums of products over blocks of terms: as if all were in phase.
 
         Parameters
@@ -313,9 +311,7 @@ class ProductSpectrum:
         """
         return product(self.along_y[index], self.along_x[plane, :, :count])
 
-    def products(
-        self, y: Array, x: Array, workers: int, of: Sequence[Pair] | None = None
-    ) -> Array:
+    def products(self, y: Array, x: Array, workers: int, of: Sequence[Pair] | None = None) -> Array:
         """Return sums of products of two planes' coefficients over blocks of terms.
 
         Parameters

@@ -103,9 +103,7 @@ class _Ones:
         stop = -1 if index.stop is None else index.stop
         return int((stop - index.start) // index.step)
 
-    def products(
-        self, y: Array, x: Array, workers: int, of: Sequence[Pair] | None = None
-    ) -> Array:
+    def products(self, y: Array, x: Array, workers: int, of: Sequence[Pair] | None = None) -> Array:
         """Return nothing: a filter does not ask."""
         return np.zeros((1, len(y) - 1, len(x) - 1))
 

@@ -19,7 +19,6 @@ from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.transfer_functions import Transfer
 
-
 USED_SHARE = 0.95
 """Part of the tolerance that all errors of the mean signal may use together."""
 

@@ -53,9 +53,7 @@ class SceneSpectrum(Protocol):
             Coefficients (n, count).
         """
 
-    def products(
-        self, y: Array, x: Array, workers: int, of: Sequence[Pair] | None = None
-    ) -> Array:
+    def products(self, y: Array, x: Array, workers: int, of: Sequence[Pair] | None = None) -> Array:
         """Return sums of products of two planes' coefficients over blocks of terms.
 
         Parameters
@@ -124,9 +122,7 @@ class SampledSpectrum:
         """
         return self.coefficients[plane, index, :count]
 
-    def products(
-        self, y: Array, x: Array, workers: int, of: Sequence[Pair] | None = None
-    ) -> Array:
+    def products(self, y: Array, x: Array, workers: int, of: Sequence[Pair] | None = None) -> Array:
         """Return sums of products of two planes' coefficients over blocks of terms.
 
         Parameters

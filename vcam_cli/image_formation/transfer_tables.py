@@ -161,7 +161,8 @@ class Tables:
     def seen(self) -> Array:
         """Which mixtures each color sees (R, C)."""
         parts = [part for part in (self.radial, *self.planes) if part is not None]
-        return np.any([part.reshape(*self.shape, -1).any(axis=2) for part in parts], axis=0)
+        seen = [part.reshape(*self.shape, -1).any(axis=2) for part in parts]
+        return np.asarray(np.any(seen, axis=0))
 
     @property
     def pairs(self) -> list[Pair]:
@@ -390,7 +391,7 @@ def _part_reader(tables: Tables, parity: int, fx: Array) -> PartReader:
     plane, radial = tables.planes[parity], None
     if parity == tables.radial_parity:
         every = tables.radial.reshape(-1, tables.radial.shape[-1])
-        lit = every.any(axis=1)
+        lit = np.asarray(every.any(axis=1))
         radial = every[lit], np.diff(every[lit]), lit
     if plane is None:
         return PartReader(tables, radial, None, None)

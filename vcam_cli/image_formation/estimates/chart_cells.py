@@ -263,8 +263,8 @@ class CellError:
         folded = np.zeros_like(passed)
         for k, m in product(contrasts, repeat=2):
             if k or m:
-                length = np.hypot(turns + k, (turns + m)[:, None])
-                folded += contrasts[k] * contrasts[m][:, None] / length**3
+                square = np.square(turns + k) + np.square(turns + m)[:, None]
+                folded += contrasts[k] * contrasts[m][:, None] / (square * np.sqrt(square))
         folded *= 2 * (side / (2 * np.pi)) ** 3
         inside = np.maximum(turns, turns[:, None]) < 0.5
         area = 4 * (self.top / FREQUENCIES) ** 2

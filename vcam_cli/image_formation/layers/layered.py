@@ -85,8 +85,8 @@ class SeenLayer:
     cover: Array
     """Opacity (C, rows, columns)."""
     path: OpticalPath
-    beyond: int
-    """Pixels by which its chart goes on beyond the window."""
+    beyond: tuple[int, int]
+    """Rows and columns by which its chart goes on beyond the window."""
     report: SpectrumReport
     cut_rms: float
     """What a cut margin of its chart changes, rms [e/s]."""
@@ -175,7 +175,8 @@ def _layers_seen(path: OpticalPath, scene: LayeredScene, form: FormImage) -> Ite
             light, cover, report = _light_and_cover(own, part, center, beyond, scene.white, form)
             cut_rms = 0.0
             if is_cut:  # the tail of a line is halved by a margin twice as wide
-                half = _light_and_cover(own, part, center, beyond // 2, scene.white, form)
+                halves = beyond[0] // 2, beyond[1] // 2
+                half = _light_and_cover(own, part, center, halves, scene.white, form)
                 level = scene.brightest * path.transfer.level[-1, :, None, None]
                 changed = np.abs(light - half[0]) + level * np.abs(cover - half[1])
                 cut_rms = rms(changed)
@@ -299,13 +300,13 @@ def _layer_path(
     brightest: float,
     hides: bool,
     share: float,
-) -> tuple[Window, OpticalPath, int, bool] | None:
+) -> tuple[Window, OpticalPath, tuple[int, int], bool] | None:
     """Return where a layer is seen, and the path of its light; None where it is beside the array.
 
     Of a layer that hides others the path has twice the colors: those of the light, and of the
     opacity in light as bright as the scene's brightest, relative to white. `share` is the part of
-    the tolerance that it may use. The third value are the pixels by which its chart is to go on
-    beyond the window, the last one whether they are too few.
+    the tolerance that it may use. The third value are the rows and columns by which its chart is to
+    go on beyond the window, the last one whether they are too few.
     """
     g = path.geometry
     # Opacity counts as the scene's brightest light, which may lie behind it; no light is cut.
@@ -314,13 +315,12 @@ def _layer_path(
     knobs = replace(path.settings, tolerance=tolerance)
     band = float(path.transfer.wavelengths[0]), float(path.transfer.wavelengths[-1])
     wanted = margin(g, effects, band, knobs)
-    beyond = min(wanted, WIDEST * max(g.rows, g.columns))
-    far = beyond * max(g.pitch_x, g.pitch_y)
-    if of_kind(effects, FieldTransfer, ImageMotion):
-        far = math.inf
-    window = _window(g, part, far)
+    most = min(wanted, WIDEST * max(g.rows, g.columns))
+    far, is_spread = most * max(g.pitch_x, g.pitch_y), of_kind(effects, FieldTransfer, ImageMotion)
+    window = _window(g, part, math.inf if is_spread else far)
     if 0 in window.pixels:
         return None
+    beyond = (most, most) if is_spread or wanted > most else _beyond(g, part, window, most)
     # What is lost of the layer's detail may all lie on the array, none of it beside it.
     knobs = replace(knobs, tolerance=tolerance * math.sqrt(_share_seen(window, beyond)))
     transfer = path.transfer.with_half_the_wavelengths()
@@ -343,14 +343,14 @@ def _layer_path(
         full=min(level, path.full),
         has_opacity=hides,
     )
-    return window, own, beyond, wanted > beyond
+    return window, own, beyond, wanted > most
 
 
 def _light_and_cover(
     path: OpticalPath,
     part: LayerPart,
     center: tuple[float, float],
-    beyond: int,
+    beyond: tuple[int, int],
     white: Spectrum,
     form: FormImage,
 ) -> tuple[Array, Array, SpectrumReport]:
@@ -364,7 +364,7 @@ def _light_and_cover(
     scene = ChartScene(
         spectra=(white,) * len(path.transfer.weights),
         white=white,
-        shape=(g.rows + 2 * beyond, g.columns + 2 * beyond),
+        shape=(g.rows + 2 * beyond[0], g.columns + 2 * beyond[1]),
         pitch_x=g.pitch_x,
         pitch_y=g.pitch_y,
         samples="averages",
@@ -387,14 +387,14 @@ def _light_and_cover(
     return np.maximum(light, 0, out=light), np.clip(cover, 0, 1, out=cover), report
 
 
-def _share_seen(window: Window, beyond: int) -> float:
+def _share_seen(window: Window, beyond: tuple[int, int]) -> float:
     """Return the part that a window sees of a chart and of its margin near the window.
 
     The chart goes on by the margin beyond; detail is lost close to it alone.
     """
     rows, columns = window.pixels
-    beyond = min(beyond, BORDER)
-    return rows * columns / ((rows + 2 * beyond) * (columns + 2 * beyond))
+    down, right = (min(pixels, BORDER) for pixels in beyond)
+    return rows * columns / ((rows + 2 * down) * (columns + 2 * right))
 
 
 def _meets(part: LayerPart, x: Array, y: Array) -> bool:
@@ -409,15 +409,39 @@ def _meets(part: LayerPart, x: Array, y: Array) -> bool:
 def _window(g: Geometry, part: LayerPart, beyond: float) -> Window:
     """Return the pixels that a layer's light reaches, so far beyond its frame [m]."""
     spans = []
-    for axis, (count, pitch) in enumerate(((g.columns, g.pitch_x), (g.rows, g.pitch_y))):
-        first, last = 0, count
-        if part.size is not None:
-            half = (part.size.width, part.size.height)[axis] / 2 + beyond
-            center = part.chart.center[axis]
-            first = math.floor(max((center - half) / pitch + count / 2, 0))
-            last = math.ceil(min((center + half) / pitch + count / 2, count))
+    for (low, high), count, pitch in zip(
+        _ends(g, part), (g.rows, g.columns), (g.pitch_y, g.pitch_x), strict=True
+    ):
+        first = math.floor(max(low - beyond / pitch, 0))
+        last = math.ceil(min(high + beyond / pitch, count))
         spans.append(slice(first, max(first, last)))
-    return Window(rows=spans[1], columns=spans[0])
+    return Window(*spans)
+
+
+def _beyond(g: Geometry, part: LayerPart, window: Window, most: int) -> tuple[int, int]:
+    """Return the rows and columns by which a chart is to go on beyond a window.
+
+    At its end it is mirrored: all light that is there or in the mirror has to be farther from the
+    window than `most` pixels, or within the chart. Of a layer that ends that far within the window
+    nothing is.
+    """
+    found = []
+    for (low, high), span in zip(_ends(g, part), (window.rows, window.columns), strict=True):
+        inside = max(min(low - span.start, span.stop - high), -most)
+        found.append(min(max(math.ceil((most - inside) / 2), 0), most))
+    return found[0], found[1]
+
+
+def _ends(g: Geometry, part: LayerPart) -> list[tuple[float, float]]:
+    """Return where a layer begins and ends along y and x, from the array's edge [pixels]."""
+    if part.size is None:
+        return [(-math.inf, math.inf)] * 2
+    (x, y), size = part.chart.center, part.size
+    axes = (y, size.height, g.pitch_y, g.rows), (x, size.width, g.pitch_x, g.columns)
+    return [
+        ((at - length / 2) / pitch + count / 2, (at + length / 2) / pitch + count / 2)
+        for at, length, pitch, count in axes
+    ]
 
 
 def is_of_lens(effect: Effect) -> bool:
