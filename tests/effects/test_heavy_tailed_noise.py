@@ -7,9 +7,14 @@ import numpy as np
 import pytest
 from making import QUIET, camera, radiance_for
 from scipy.special import beta
+from scipy.stats import tukeylambda
 
 from vcam_cli import simulate
-from vcam_cli.effects.noise.heavy_tailed_noise import HeavyTailedNoise, tukey_lambda
+from vcam_cli.effects.noise.heavy_tailed_noise import (
+    HeavyTailedNoise,
+    tukey_lambda,
+    tukey_lambda_spread,
+)
 from vcam_cli.effects.signal_chain import Site
 from vcam_cli.rng import stream
 
@@ -56,6 +61,12 @@ def test_share_beyond_each_quantile(shape):
 def test_small_shapes_reach_the_logistic():
     u = np.array([1e-12, 0.2, 0.5, 0.9])
     np.testing.assert_allclose(tukey_lambda(u, 1e-9), np.log(u / (1 - u)), rtol=1e-7, atol=1e-15)
+
+
+@pytest.mark.parametrize("shape", [-0.4, -0.11, -0.0999, -1e-9, 0.0, 1e-5, 0.0999, 0.11, 0.5])
+def test_the_spread_is_that_of_tukeys_distribution(shape):
+    """On both sides of where it is a series; the library's own formulas err by 1e-14."""
+    assert tukey_lambda_spread(shape) == pytest.approx(tukeylambda.std(shape), rel=3e-14)
 
 
 def test_tails_in_a_frame_stand_out_of_normal_ones(tmp_path):
