@@ -29,6 +29,9 @@ from vcam_cli.spectra import Spectrum, pair_weights, photons
 
 VALUES = 1 << 17
 """Values of a transfer that are computed together, about."""
+AT_ONCE = 1 << 20
+"""Values of a response at all wavelengths that are held at once: a table of `accuracy: reference`
+has five times as many."""
 MOST_APART = 41e-9
 """Wavelengths between which a transfer is taken as linear: two steps of the coarsest band [m]."""
 
@@ -47,7 +50,9 @@ class Band:
         return np.linspace(self.start, self.stop, count)
 
 
-_RESPONSES: ByteCache[Array] = ByteCache(1 << 22, strict=True)
+KEPT = 1 << 22
+"""Bytes of responses that are kept."""
+_RESPONSES: ByteCache[Array] = ByteCache(KEPT, strict=True)
 """Responses of the last lenses, by all that they depend on: pictures before one lens need the
 same again, 5 % of a frame of 64 x 64 pixels."""
 
@@ -110,7 +115,10 @@ class Transfer:
             return np.broadcast_to(level, (*self.level.shape, *frequency.shape))
 
         def compute() -> Array:
-            found = self.spectral_sum(self.otf_radial(frequency))
+            found, at = np.empty((*self.level.shape, frequency.size)), frequency.ravel()
+            for part in pieces(len(at), max(1, AT_ONCE // len(self.wavelengths))):
+                found[..., part] = self.spectral_sum(self.otf_radial(at[part]))
+            found = found.reshape(*self.level.shape, *frequency.shape)
             found.setflags(write=False)
             return found
 

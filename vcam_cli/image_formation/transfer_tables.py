@@ -454,7 +454,9 @@ def tabulate(exact: Transfer, size: TableSize, mixing: Mixing) -> Tables:
     return _TABLES.get(key, lambda: _tabulated(exact, size, mixing))
 
 
-_TABLES: ByteCache[Tables] = ByteCache(1 << 22, strict=True)
+KEPT = 1 << 22
+"""Bytes of tables that are kept."""
+_TABLES: ByteCache[Tables] = ByteCache(KEPT, strict=True)
 """Tables of the last lenses. Those of one lens are the same object, so that what follows from them
 is known, too: `strategies.picture_filter`."""
 
