@@ -17,7 +17,11 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.effects.base import Effect
 from vcam_cli.effects.warps import Magnification
+from vcam_cli.physics import pupil_harmonics
 from vcam_cli.physics.ray_spot import RaySpot
+
+INTERPOLATION = 28_000_000
+"""Memory of SciPy's interpolation and of all that it imports [bytes]."""
 
 PLACES = 3
 """Places of the field over which the contrast of a blur that changes over it is averaged."""
@@ -307,8 +311,12 @@ class PlaneTransfer(Blur):
     integral h(x, y) exp(-2 pi i (fx x + fy y)) dx dy, x to the right and y down.
     """
 
-    working_bytes: ClassVar[int] = 0
-    """Memory that it takes once while its harmonics are computed, for all places together."""
+    library_bytes: ClassVar[int] = 0
+    """Memory of libraries that are loaded for it alone."""
+
+    def most_harmonics(self, wavelengths: Array) -> int:
+        """Return the number of `harmonics` at wavelengths (J,) [m], at most."""
+        return pupil_harmonics.MOST
 
     def harmonics(self, frequency: Array, wavelengths: Array) -> Array:
         """Return the transfer as harmonics of the direction; `pupil_harmonics` defines them.

@@ -9,6 +9,7 @@ share.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -32,6 +33,9 @@ nodes then errs by 1e-5 of what the OTF has lost up to there."""
 FEW = 1 << 14
 """Terms of a piece up to which all colors are filtered in one call: frames of 64 x 64 pixels, whose
 pieces have some hundred terms, take two thirds of the time."""
+STRETCHES = 4
+"""Stretches among rows that are filtered together, about: one for high frequencies, more for low
+ones."""
 SHORTEST = 8
 """Rows below which every row has its own transfer function."""
 KEPT = 1 << 16
@@ -381,6 +385,34 @@ class Filter:
 
         each(evaluate, [(c, s) for c in range(len(folded)) for s in columns], threads)
         return out if window is None else out[:, window]
+
+
+def working_bytes(x: Axis, y: Axis, planes: int, colors: int, width: int) -> int:
+    """Return the memory of a thread while it filters a piece of a spectrum.
+
+    Parameters
+    ----------
+    x, y : Axis
+        Samples and pixels along x and y, with the terms that are filtered.
+    planes : int
+        Number of planes of the spectrum.
+    colors : int
+        Number of colors.
+    width : int
+        Memory of a number [bytes].
+
+    Returns
+    -------
+    int
+        Bytes: transfer functions at the nodes of all rows that fold onto the piece, what is read of
+        the tables for a stretch of them, the rows of all planes, and light of one or all colors.
+    """
+    rows = min(rows_at_once(x.terms), y.terms, LONGEST)
+    folds = math.ceil(y.terms / y.folded_terms)
+    nodes = planes * colors * min(NODES, y.terms) * x.terms
+    light = colors if rows * x.terms <= FEW else 1
+    of_rows = (planes + 3 * light) * rows * x.terms
+    return width * (folds * STRETCHES * nodes + of_rows) + 8 * 3 * nodes
 
 
 def chebyshev(at: Array) -> tuple[Array, Array]:

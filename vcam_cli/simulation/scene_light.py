@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass, replace
 from functools import partial
 
+import numpy as np
+
 from vcam_cli import memory
 from vcam_cli.arrays import Array
 from vcam_cli.effects.base import Effect, of_kind
@@ -386,6 +388,7 @@ def _require_memory(solved: Solved) -> int:
         _edge_pixels(solved),
         bool(of_kind(solved.effects.enabled, Transport)),
         on_screen,
+        np.dtype(exposure.codes_type(solved.chain.adc.bits)).itemsize,
     )
     memory.require(needed, array.rows, array.columns)
     return needed

@@ -22,7 +22,7 @@ from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.prescription import lateral_color, wavefronts
 from vcam_cli.camera.derived.traced import traced_view
 from vcam_cli.effects.base import SignalLevels, switched_off
-from vcam_cli.effects.blurs import FieldTransfer, PlaneTransfer, Zone
+from vcam_cli.effects.blurs import INTERPOLATION, FieldTransfer, PlaneTransfer, Zone
 from vcam_cli.effects.optics.field_blur import ZoneWeight
 from vcam_cli.effects.optics.wavefront_blur import GREEN, AberrationBlur
 from vcam_cli.effects.warps import Magnification
@@ -87,7 +87,7 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
         """Take a pickled state, with a lock of its own."""
         self.__dict__.update(state, lock=Lock())
 
-    working_bytes = 60_000_000  # libraries, 28 MB; the rest was fitted to peaks before two scenes
+    library_bytes = INTERPOLATION
 
     @classmethod
     def from_camera(cls, camera: Camera, geometry: Geometry) -> None:
@@ -164,15 +164,38 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
         Light in parts of the spectrum, and further frames through the lens, share the table. Rays
         cost as much for each frequency: few are computed without one.
         """
-        step = 1 / (STEPS_PER_PERIOD * self.reach)
         at = np.minimum(frequency, self._end)
-        count = math.ceil((self._end if self.diffracts else float(at.max())) / step) + STENCIL
+        if self.diffracts:
+            return _between(self._table(self._end), at / self._step)
+        inside = int(np.count_nonzero(frequency < self._end))
+        if inside < self._entries(float(at.max())) // 2:
+            few = self._kept_harmonics(frequency[:inside]).astype(np.complex128)
+            return np.pad(few, ((0, 0), (0, len(frequency) - inside), (0, 0)))
+        return _between(self._table(float(at.max())), at / self._step)
+
+    @property
+    def _step(self) -> float:
+        """Distance of a table's entries [cycles/m]."""
+        return 1 / (STEPS_PER_PERIOD * self.reach)
+
+    def _entries(self, highest: float) -> int:
+        return math.ceil(highest / self._step) + STENCIL
+
+    def _table(self, highest: float) -> Array:
+        """Return the harmonics (nodes, entries, m) from 0 to a frequency [cycles/m]."""
+        return self._kept_harmonics(self._step * np.arange(self._entries(highest)))
+
+    def most_harmonics(self, wavelengths: Array) -> int:
+        """Return the number of harmonics: of waves that of its table, which is made once."""
         if not self.diffracts:
-            inside = int(np.count_nonzero(frequency < self._end))
-            if inside < count // 2:
-                few = self._kept_harmonics(frequency[:inside]).astype(np.complex128)
-                return np.pad(few, ((0, 0), (0, len(frequency) - inside), (0, 0)))
-        return _between(self._kept_harmonics(step * np.arange(count)), at / step)
+            return super().most_harmonics(wavelengths)
+        return self._table(self._end).shape[-1]
+
+    def kept_bytes(self, wavelengths: Array, by_harmonics: bool = False) -> int:
+        """Return the memory of its table, and of the grids that it is made from [bytes]."""
+        if not self.diffracts:
+            return 0
+        return self._table(self._end).nbytes + sum(grid.nbytes for grid in self.kept.values())
 
     def _kept_harmonics(self, frequency: Array) -> Array:
         key = self.wavefront.field, self.wavefront.place, self.diffracts, self.color

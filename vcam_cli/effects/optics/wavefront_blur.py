@@ -25,6 +25,9 @@ from vcam_cli.physics.ray_spot import RaySpot
 from vcam_cli.physics.zernike import DEFOCUS, Terms
 
 GREEN = 550e-9
+FEW_HARMONICS = 64
+"""Harmonics of the direction of wavefronts of few waves: up to 73 are seen where slopes are
+steepest, half as many in the mean over the rings."""
 """Wavelength that descriptions refer to [m]."""
 SURE_OF_SLOPE = 1.02
 """Factor on the largest slope of a wavefront, which is found to about 1 %."""
@@ -415,6 +418,14 @@ class DirectedBlur(UniformBlur, PlaneTransfer):
         if few or not self.lens.diffracts:
             return 0
         return aberration.grid_bytes(wavelengths, self.terms)
+
+    def most_harmonics(self, wavelengths: Array) -> int:
+        """Return the number of harmonics, at most; a wavefront of few waves has few."""
+        blurs = self.extremes if self.focus is not None else (self,)
+        few = self.lens.diffracts and all(
+            aberration.has_few_waves(wavelengths, blur.terms) for blur in blurs
+        )
+        return FEW_HARMONICS if few else super().most_harmonics(wavelengths)
 
     def largest(self, frequency: Array, wavelength: float) -> Array:
         """Return the largest contrast (n,) in any direction by rays; 1 by waves, which end."""

@@ -10,10 +10,12 @@ from collections.abc import Sequence
 
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import of_kind
-from vcam_cli.effects.blurs import PlaneTransfer
+from vcam_cli.effects.blurs import INTERPOLATION, PlaneTransfer
+from vcam_cli.image_formation import transfer_functions, transfer_tables
 from vcam_cli.image_formation.estimates.bandwidth import axes
 from vcam_cli.image_formation.far_field import FarPart
 from vcam_cli.image_formation.field_dependence import ring_entries
+from vcam_cli.image_formation.filtering import working_bytes
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.transfer_tables import (
@@ -27,12 +29,12 @@ from vcam_cli.scenes.bands import bands_of_rows
 from vcam_cli.scenes.base import ChartScene, SampledScene
 from vcam_cli.scenes.charts import dead_leaves
 
-BASE = 155_000_000
-"""Interpreter and libraries of `vcam run`, 132 to 145 MB; a call of the library takes
+BASE = 145_000_000
+"""Interpreter and libraries of `vcam run`, 131 to 145 MB; a call of the library takes
 40 MB less [bytes]."""
-LATER = 15_000_000
-"""Libraries among them that are loaded behind the light: 132 to 136 MB are taken before a chart is
-painted [bytes]."""
+LATER = 12_000_000
+"""What of it is taken behind the light: 125 to 133 MB are taken before a chart is painted
+[bytes]."""
 HALVES, DISPARITY = 100, 170
 """What codes of both halves of a pixel take, and writing them and their disparity beside other
 files [bytes]: 27 and 45 MB were measured for `dual-pixel`, beyond what its light takes."""
@@ -45,12 +47,9 @@ light, what is collected and read of it, what is beyond the well and room in it 
 64 bits counts as two, rounded it is one more, and so is its product, as traced for `eev-44-82`."""
 SLACK = 1.1
 """Memory of the process over what is in use: freed memory is not given back at once."""
-FEW_HARMONICS = 64
-"""Harmonics of the direction of wavefronts of few waves: up to 73 are seen where slopes are
-steepest, half as many in the mean over the rings."""
-WORK, WORK_OF_TRANSFER, WORK_OF_PIXEL = 12_000_000, 1_000_000, 16
-"""Temporary arrays of one thread, for each transfer of a mixture in a color besides, and for a
-pixel of small arrays at most [bytes]."""
+WORK, WORK_OF_PIXEL = 12_000_000, 16
+"""Temporary arrays of one thread behind the light, and for a pixel of small arrays at most
+[bytes]."""
 PART = 150
 """Of each part of cells that are painted in parts: 39 MB were taken of 255 744 of them [bytes]."""
 PERIOD = 67_000_000
@@ -107,21 +106,21 @@ def image_bytes(
     waves = 4 if path.transfer.plane_blurs else waves
     series = colors * (waves + (2 if path.field_rings else 0))
     parts = [(width, scene), *((8, part.scene) for part in rings)]
-    painted = held = 0
+    painted = held = work = 0
     for each, part in parts:
         samples = each * _samples(path, part, highest, planes)
         if part is not scene and isinstance(part, ChartScene) and part.is_painted:
             # as it is painted, which the next ring subtracts, and a copy that is transformed
             samples = (width + each) * planes * math.prod(part.shape)
         held = max(held, samples + each * series * _series(path, part, filtered))
+        x, y = axes(path, part, filtered)
+        work = max(work, working_bytes(x, y, planes, colors, each))
         at_once = _painting_bytes(path, part, each * planes)
         if part is not scene and isinstance(part, ChartScene) and part.chart.edge_seconds:
             at_once += PERIOD * _reads_a_period(part)
         painted = max(painted, round(SLACK * samples) + at_once)
     pixels = g.rows * g.columns
-    filtering = round(SLACK * (held + pixels * width)) + work_bytes(
-        pixels, path.workers, planes * colors
-    )
+    filtering = round(SLACK * (held + pixels * width)) + path.workers * work
     return BASE + max(filtering, painted - LATER)
 
 
@@ -157,7 +156,7 @@ def device_bytes(path: OpticalPath, scene: SampledScene, highest: float, planes:
 
 
 def table_bytes(path: OpticalPath, planes: int, size: TableSize) -> int:
-    """Return the memory of tables of blurs that have a direction, beside the image.
+    """Return the memory of tables of transfer functions, beside the image.
 
     How far they reach is known once the scene's spectrum is.
 
@@ -173,9 +172,10 @@ def table_bytes(path: OpticalPath, planes: int, size: TableSize) -> int:
     Returns
     -------
     int
-        Bytes, at least those measured; 0 where there are none.
+        Bytes, at least those measured.
     """
     colors = len(path.mosaic.colors)
+    of_length = _radial_bytes(path, planes, size)
     light = path.transfer.with_half_the_wavelengths().wavelengths
     of_blurs = 0
     if directed := path.transfer.tabulated_blurs:
@@ -185,16 +185,37 @@ def table_bytes(path: OpticalPath, planes: int, size: TableSize) -> int:
         by_wavelength = min(len(light) * 2 * entries**2, ROWS_VALUES) * 40
         tables = by_wavelength + 3 * 8 * per_table
         of_blurs = round(SLACK * (tables + sum(blur.kept_bytes(light) for blur in directed)))
+        of_blurs += INTERPOLATION
     directed = of_kind([ring.blur for ring in path.field_rings], PlaneTransfer)
     if not directed:
-        return of_blurs
+        return of_length + of_blurs
     grids = [blur.kept_bytes(light, by_harmonics=True) for blur in directed]
-    harmonics = MOST if any(grids) or math.isinf(path.transfer.cutoff) else FEW_HARMONICS
-    # of every ring all harmonics; of one of them by wavelength, its copy, and real parts
-    values = len(directed) * planes * colors + 4 * len(light)
-    tables = 16 * ring_entries(path.field_rings, size) * values * harmonics
-    of_field = round(SLACK * (tables + min(sum(grids), GRID_CACHE_BYTES + max(grids))))
-    return of_blurs + of_field + max(blur.working_bytes for blur in directed)
+    kept = min(sum(grids), GRID_CACHE_BYTES + max(grids))
+    of_field = round(SLACK * (_harmonic_bytes(path, planes * colors, size) + kept))
+    return of_length + of_blurs + of_field + max(blur.library_bytes for blur in directed)
+
+
+def _radial_bytes(path: OpticalPath, planes: int, size: TableSize) -> int:
+    """Return the memory of a table over |f|: while it is made, and while it is read."""
+    values = planes * len(path.mosaic.colors) * size.entries
+    at_once = min(len(path.transfer.wavelengths) * size.entries, transfer_functions.AT_ONCE)
+    # kept, and the steps between its entries; those of the scene's bound are kept besides
+    kept = min(8 * 2 * values, transfer_functions.KEPT + transfer_tables.KEPT)
+    return round(SLACK * (8 * 2 * values + max(kept, 8 * 2 * at_once)))
+
+
+def _harmonic_bytes(path: OpticalPath, transfers: int, size: TableSize) -> int:
+    """Return the memory of the harmonics of all rings of a field, for so many transfers each."""
+    light = path.transfer.with_half_the_wavelengths().wavelengths
+    held = most = 0
+    for blur in of_kind([ring.blur for ring in path.field_rings], PlaneTransfer):
+        harmonics = blur.most_harmonics(light)
+        # by wavelength and a copy; directions are added until there are so few harmonics
+        copies = 2 if harmonics < MOST else 4
+        one = 16 * ring_entries(path.field_rings, size) * harmonics
+        most = max(most, held + one * (copies * len(light) + 2 * transfers))
+        held += one * transfers
+    return most
 
 
 def _samples(path: OpticalPath, scene: SampledScene, highest: float, planes: int) -> int:
@@ -244,8 +265,8 @@ def _series(path: OpticalPath, scene: SampledScene, highest: float) -> int:
     return y.folded_terms * x.folded_terms + evaluated
 
 
-def work_bytes(pixels: int, workers: int, transfers: int = 0) -> int:
-    """Return the memory of temporary arrays of all threads.
+def work_bytes(pixels: int, workers: int) -> int:
+    """Return the memory of temporary arrays of all threads behind the light.
 
     Parameters
     ----------
@@ -253,15 +274,13 @@ def work_bytes(pixels: int, workers: int, transfers: int = 0) -> int:
         Pixels of the array.
     workers : int
         Number of threads.
-    transfers : int, optional
-        Mixtures of the scene's components, times colors, that are filtered.
 
     Returns
     -------
     int
         Bytes.
     """
-    return workers * min(WORK + transfers * WORK_OF_TRANSFER, WORK_OF_PIXEL * pixels)
+    return workers * min(WORK, WORK_OF_PIXEL * pixels)
 
 
 def half_image_bytes(pixels: int, with_disparity: bool) -> int:
@@ -362,6 +381,7 @@ def frame_bytes(
     edge: int = 0,
     transported: bool = False,
     screen: int = 0,
+    codes: int = 2,
 ) -> int:
     """Return the memory of a frame without its scene: signal, raw, render, figures.
 
@@ -385,6 +405,8 @@ def frame_bytes(
         Whether charge is transported through the array.
     screen : int, optional
         What S-CIELAB adds to the process beside the two images that it compares [bytes]; 0 without.
+    codes : int, optional
+        Memory of a code [bytes].
 
     Returns
     -------
@@ -393,15 +415,16 @@ def frame_bytes(
     """
     pixels = geometry.rows * geometry.columns
     width = knobs.float_width // 8
-    frame = pixels * (2 * width + 3 + colors)  # rate, electrons, codes, numbers of colors, render
+    # rate, electrons, codes, numbers of colors, render
+    frame = pixels * (2 * width + codes + 1 + colors)
     # The SNR of the picture has its signal, a copy and a mask, before any image is compared.
     figures = max(pixels * (2 * width + 1), EDGE * edge)
     compared = comparison_bytes(pixels, colors) if judged else 0
     if screen:
         compared = max(compared, 2 * pixels * colors * width + round(screen / SLACK))
     frame += max(figures, compared)
-    if samples:  # their electrons and codes, the photocurrent and what is made into a picture
-        frame += pixels * (samples * (width + 4) + 8)
+    if samples:  # all but the last's, the photocurrent, and what is made into a picture
+        frame += pixels * ((samples - 1) * (width + codes) + 2 * width)
     frame += SCATTERED * scattered
     light = pixels * width * max(colors + 1, TRANSPORTED if transported else 0)
     held = max(light, frame)
