@@ -270,6 +270,30 @@ class SampledScene(ABC):
         return ChangeBounds(0.0, [math.inf] * len(losses))
 
 
+@dataclass(frozen=True)
+class PaintedCells:
+    """Cells of a chart that are painted at once, among those of a grid."""
+
+    shape: tuple[int, int]
+    """Rows and columns."""
+    pitch: float
+    """Longer side of a cell [m]."""
+    extent: tuple[float, float]
+    """Width and height of the grid [m]."""
+    values: int
+    """Memory of all planes of a cell [bytes]."""
+
+    @property
+    def count(self) -> int:
+        """Number of cells that are painted at once."""
+        return math.prod(self.shape)
+
+    @property
+    def in_grid(self) -> float:
+        """Number of cells of the grid, about."""
+        return math.prod(self.extent) / self.pitch**2
+
+
 class Chart(ABC):
     """A picture on the whole plane; positions in meters from the array's center, rising.
 
@@ -279,10 +303,11 @@ class Chart(ABC):
 
     edge_seconds: ClassVar[float] = 0.0
     """Core seconds to find the edges that a frame sees, whatever its cells; see `cost_model`."""
-    cell_bytes: ClassVar[int] = 0
-    """Memory of temporary arrays for each cell that is painted at once, beside its values."""
     undivided: ClassVar[float] = math.inf
     """Largest width of cells that are painted as they are; wider ones are painted in parts [m]."""
+
+    painted: "ClassVar[Chart | None]" = None
+    """Chart that this one is painted from, on the same cells; None of one that stands alone."""
 
     @property
     def brightest(self) -> float:
@@ -341,6 +366,36 @@ class Chart(ABC):
         Array
             Values (R, len(y), len(x)), in the unit of `mix`.
         """
+
+    def painting_bytes(self, cells: PaintedCells) -> int:
+        """Return the memory of temporary arrays of a thread that paints cells, beside their values.
+
+        Parameters
+        ----------
+        cells : PaintedCells
+            The cells that are painted at once.
+
+        Returns
+        -------
+        int
+            Memory [bytes].
+        """
+        return self.painted.painting_bytes(cells) if self.painted else 0
+
+    def kept_bytes(self, cells: PaintedCells) -> int:
+        """Return the memory of what is kept, or shared by threads, once cells are painted.
+
+        Parameters
+        ----------
+        cells : PaintedCells
+            The cells that are painted at once.
+
+        Returns
+        -------
+        int
+            Memory [bytes].
+        """
+        return self.painted.kept_bytes(cells) if self.painted else 0
 
     def box_averages(
         self, x: Array, y: Array, size: tuple[float, float], mix: Array

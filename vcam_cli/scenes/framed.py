@@ -54,7 +54,7 @@ class Framed(Chart):
     chart: Chart
     frame: Frame
     edge_seconds = property(lambda self: self.chart.edge_seconds)
-    cell_bytes = property(lambda self: self.chart.cell_bytes)
+    painted = property(lambda self: self.chart)
     undivided = property(lambda self: self.chart.undivided)
 
     @property

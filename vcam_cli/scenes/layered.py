@@ -49,7 +49,7 @@ class MaskedChart(Chart):
 
     edge_seconds = property(lambda self: self.light.edge_seconds)
     undivided = property(lambda self: self.light.undivided)
-    cell_bytes = property(lambda self: self.light.cell_bytes)
+    painted = property(lambda self: self.light)
 
     @property
     def brightest(self) -> float:
@@ -141,7 +141,7 @@ class LayerChart(Chart):
 
     edge_seconds = property(lambda self: self.layer.edge_seconds)
     undivided = property(lambda self: self.layer.undivided)
-    cell_bytes = property(lambda self: self.layer.cell_bytes)
+    painted = property(lambda self: self.layer)
 
     @property
     def brightest(self) -> float:

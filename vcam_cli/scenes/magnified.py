@@ -69,7 +69,7 @@ class MagnifiedChart(Chart):
     brightest = property(lambda self: self.chart.brightest)
     darkest = property(lambda self: self.chart.darkest)
     edge_seconds = property(lambda self: self.chart.edge_seconds)
-    cell_bytes = property(lambda self: self.chart.cell_bytes)
+    painted = property(lambda self: self.chart)
     undivided = property(lambda self: self.chart.undivided * self.factor)
     separates = property(lambda self: self.chart.separates)
 

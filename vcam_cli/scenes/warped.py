@@ -19,7 +19,7 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.parallel import pieces, product
-from vcam_cli.scenes.base import Chart
+from vcam_cli.scenes.base import Chart, PaintedCells
 from vcam_cli.scenes.cells import cell_means
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region
 
@@ -68,9 +68,9 @@ LOOKS, LOOKS_IN_TILE = 33, 5
 """Places along each side of a map, and of a tile, at which its scale is looked at."""
 TINY = 1e-30
 """Less than any second moment that counts."""
-SQUARES = 150
-"""Temporary arrays for each cell whose squares are painted [bytes], fitted above the peaks of runs:
-74 are in use before leaves, where 150 are counted."""
+IN_USE, OF_PLACE = 4.5, 100
+"""Arrays of a tile's painted cells in use at once, those of blocks for half, and temporary arrays
+of each place that looks there [bytes]."""
 CORNERS = ((-1, -1), (-1, 1), (1, -1), (1, 1))
 """Signs of the ways to four squares."""
 PAIRS = ((0, 0), (1, 1), (0, 1))
@@ -244,7 +244,6 @@ class WarpedChart(Chart):
     on the sensor [m2]."""
 
     edge_seconds = property(lambda self: self.chart.edge_seconds)
-    cell_bytes = property(lambda self: self.chart.cell_bytes + SQUARES)
     undivided = property(lambda self: min(self.chart.undivided / self.sees.scales[1], self.widest))
 
     @property
@@ -278,13 +277,41 @@ class WarpedChart(Chart):
         densest = max(found, key=lambda energy: energy.aligned + energy.oblique)
         return replace(densest.scaled(self.sees.scales[0]), alike=0.0)  # lines become curves
 
+    def painting_bytes(self, cells: PaintedCells) -> int:
+        """Return the memory of temporary arrays of a thread: those of a tile."""
+        tile = self._tile_cells(cells)
+        own = IN_USE * tile.values * tile.count + OF_PLACE * tile.count / FINER**2
+        return round(max(own, tile.values * tile.count + self.chart.painting_bytes(tile)))
+
+    def kept_bytes(self, cells: PaintedCells) -> int:
+        """Return the memory of what the chart keeps of all tiles."""
+        return self.chart.kept_bytes(self._tile_cells(cells))
+
+    def _tile_cells(self, cells: PaintedCells) -> PaintedCells:
+        """Return the cells of the chart that are painted for a tile."""
+        parts = self._parts(cells.pitch)
+        sides = (min(TILE, parts * n) * FINER + 2 * BEYOND + FINER for n in cells.shape)
+        # Narrow squares along what cells see, where that is longer than wide.
+        long = min(math.sqrt(1 + self.sees.elongation), MOST_FINER)
+        rows, columns = sides
+        scale = self.sees.scales[0]
+        return PaintedCells(
+            shape=(rows, math.ceil(columns * long)),
+            pitch=cells.pitch * scale / parts / FINER,
+            extent=(cells.extent[0] * scale, cells.extent[1] * scale),
+            values=cells.values,
+        )
+
+    def _parts(self, pitch: float) -> int:
+        """Return the parts along each side of a cell of a size [m]."""
+        return max(1, min(math.ceil(pitch / self.widest - SLIVER), MOST_PARTS))
+
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
         """Write the averages over the cells between edges, of one size, into an array."""
         x, y = ((edges[1:] + edges[:-1]) / 2 for edges in (x_edges, y_edges))
         width, height = ((e[-1] - e[0]) / (len(e) - 1) for e in (x_edges, y_edges))
         size = width, height
-        count = max(1, min(math.ceil(max(size) / self.widest - SLIVER), MOST_PARTS))
-        self._paint(x, y, size, count, mix, out)
+        self._paint(x, y, size, self._parts(max(size)), mix, out)
 
     def box_averages(self, x: Array, y: Array, size: tuple[float, float], mix: Array) -> Array:
         """Return the averages over boxes about places, which may overlap: (R, len(y), len(x))."""

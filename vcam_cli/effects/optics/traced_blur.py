@@ -189,7 +189,7 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
         """Return the number of harmonics: of waves that of its table, which is made once."""
         if not self.diffracts:
             return super().most_harmonics(wavelengths)
-        return self._table(self._end).shape[-1]
+        return int(self._table(self._end).shape[-1])
 
     def kept_bytes(self, wavelengths: Array, by_harmonics: bool = False) -> int:
         """Return the memory of its table, and of the grids that it is made from [bytes]."""

@@ -26,8 +26,7 @@ from vcam_cli.image_formation.transfer_tables import (
 from vcam_cli.physics.aberration import GRID_CACHE_BYTES
 from vcam_cli.physics.pupil_harmonics import MOST
 from vcam_cli.scenes.bands import bands_of_rows
-from vcam_cli.scenes.base import ChartScene, SampledScene
-from vcam_cli.scenes.charts import dead_leaves
+from vcam_cli.scenes.base import ChartScene, PaintedCells, SampledScene
 
 BASE = 145_000_000
 """Interpreter and libraries of `vcam run`, 131 to 145 MB; a call of the library takes
@@ -50,12 +49,6 @@ SLACK = 1.1
 WORK, WORK_OF_PIXEL = 12_000_000, 16
 """Temporary arrays of one thread behind the light, and for a pixel of small arrays at most
 [bytes]."""
-PART = 150
-"""Of each part of cells that are painted in parts: 39 MB were taken of 255 744 of them [bytes]."""
-PERIOD = 67_000_000
-"""Leaves of one period, from which wide cells of rings are read [bytes]: 18 for each of 1500 x 1500
-cells are kept, and 8 MB of the cells of narrower rings; averages of two pictures over 192 columns
-of 1500 rows, in four planes of 32 bits, are kept besides."""
 EDGE = 46
 """Of a pixel that the response of a slanted edge is found from: codes, distances from the edge, and
 their order, as measured [bytes]."""
@@ -115,10 +108,7 @@ def image_bytes(
         held = max(held, samples + each * series * _series(path, part, filtered))
         x, y = axes(path, part, filtered)
         work = max(work, working_bytes(x, y, planes, colors, each))
-        at_once = _painting_bytes(path, part, each * planes)
-        if part is not scene and isinstance(part, ChartScene) and part.chart.edge_seconds:
-            at_once += PERIOD * _reads_a_period(part)
-        painted = max(painted, round(SLACK * samples) + at_once)
+        painted = max(painted, round(SLACK * samples) + _painting_bytes(path, part, each * planes))
     pixels = g.rows * g.columns
     filtering = round(SLACK * (held + pixels * width)) + path.workers * work
     return BASE + max(filtering, painted - LATER)
@@ -235,24 +225,16 @@ def _samples(path: OpticalPath, scene: SampledScene, highest: float, planes: int
     return 2 * (down * y.terms + along * x.terms) + planes * down * x.terms
 
 
-def _painting_bytes(path: OpticalPath, scene: SampledScene, width: int) -> int:
-    """Memory of bands of cells while they are painted, with `width` bytes a cell."""
+def _painting_bytes(path: OpticalPath, scene: SampledScene, values: int) -> int:
+    """Memory of bands of cells while they are painted, with `values` bytes a cell."""
     if not (isinstance(scene, ChartScene) and scene.is_painted):
         return 0
     rows, columns = scene.shape
     bands = bands_of_rows(rows, columns)
-    band, threads = columns * bands[0].stop, min(path.workers, len(bands))
-    largest = max(scene.pitch_x, scene.pitch_y) / scene.chart.undivided
-    parts = min(math.ceil(largest) ** 2 * band, dead_leaves.AT_ONCE) if largest > 1 else 0
-    cell_bytes: int = scene.chart.cell_bytes
-    return int(threads * (band * (width + cell_bytes) + parts * PART))
-
-
-def _reads_a_period(scene: ChartScene) -> bool:
-    """Return whether leaves on the scene's cells are read from sums over one period."""
-    unit = scene.chart.undivided * dead_leaves.UNDIVIDED
-    cell = max(scene.pitch_x, scene.pitch_y) / unit
-    return dead_leaves.reads_a_period(cell, max(scene.extent) / unit)
+    pitch = max(scene.pitch_x, scene.pitch_y)
+    band = PaintedCells((bands[0].stop, columns), pitch, scene.extent, values)
+    of_thread = band.count * values + scene.chart.painting_bytes(band)
+    return min(path.workers, len(bands)) * of_thread + scene.chart.kept_bytes(band)
 
 
 def _series(path: OpticalPath, scene: SampledScene, highest: float) -> int:

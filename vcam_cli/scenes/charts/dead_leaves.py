@@ -25,8 +25,9 @@ from functools import lru_cache, partial
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.physics.cache import ByteCache
 from vcam_cli.scenes import discs
-from vcam_cli.scenes.base import Chart, Frame
+from vcam_cli.scenes.base import Chart, Frame, PaintedCells
 from vcam_cli.scenes.cells import cell_edges
 from vcam_cli.scenes.disc_edges import MOST, Discs, divisions
 from vcam_cli.scenes.discs import Cells
@@ -39,13 +40,19 @@ LAYERS = 5.0
 """Mean number of leaves over a point; exp(-5) of the ground shows."""
 PERIOD = 1.5
 """Distance after which the leaves repeat, in units of the frame's longer side."""
+FINEST = 1000
+"""Cells a side of the sums over one period. Wider cells err more, in proportion: by 0.68, 1.01 and
+1.47 of what 0.4, 0.6 and 0.8 of the smallest leaf's radius were asked to, undivided."""
+ROWS = round(PERIOD * FINEST)
+"""Rows, and columns, of these cells."""
+PERIOD_BYTES = 18
+"""Memory of which leaf is seen in one of them, as measured [bytes]; all of them are kept."""
+COLUMNS = 1 << 25
+"""Bytes of averages over columns that are kept: those of narrow rings, and the last ones."""
 UNDIVIDED = 600
 """Cells a side that are painted directly, at least. Where many leaves share a cell, telling which
 is seen where takes time and gigabytes: larger cells are divided. With 1000, eight layers of leaves
 took 1.3 times as long in a first frame."""
-FINEST = 1000
-"""Cells a side of the sums over one period. Wider cells err more, in proportion: by 0.68, 1.01 and
-1.47 of what 0.4, 0.6 and 0.8 of the smallest leaf's radius were asked to, undivided."""
 AT_ONCE = 1 << 18
 """Cells that are painted at once where many leaves are seen: bounds the memory of temporaries."""
 KEPT_CELLS = 1 << 22
@@ -62,6 +69,12 @@ CELL_BYTES = 95
 """Temporary arrays for each cell [bytes]: 12 to 110 were measured, most where a band sees half of
 the leaves of a frame. What libraries take less than is counted covers 15 of a band of 2^19 cells.
 """
+PART_BYTES = 150
+"""The same of each part of cells that are painted in parts: 39 MB were taken of 255 744 of them."""
+LABEL_BYTES, CROSSED_BYTES = 2, 31
+"""What is kept of a cell, and of one that an outline crosses, as measured [bytes]."""
+OUTLINE = 2 * (1 / SMALLEST - 1 / LARGEST) / math.log(LARGEST / SMALLEST)
+"""Visible outline on an area [1 / the frame's longer side], see `leaf_energy`."""
 DARKEST = 0.25
 """Lower bound of a leaf's own factor, which is uniform between this and 1."""
 
@@ -183,7 +196,7 @@ def leaf_energy(unit: float, level: Array, ceiling: float) -> EdgeEnergy:
     .. [1] G. Matheron, "Schema booleen sequentiel de partition aleatoire", Ecole des Mines de
        Paris, 1968; C. Bordenave, Y. Gousseau, F. Roueff, Adv. Appl. Probab. 38, 31-46, 2006.
     """
-    outline = 2 * (1 / SMALLEST - 1 / LARGEST) / math.log(LARGEST / SMALLEST) / unit
+    outline = OUTLINE / unit
     often = np.array(list(PIGMENTS.values()), float)
     factors = DARKEST + (1 - DARKEST) * (np.arange(FACTORS) + 0.5) / FACTORS
     light = np.outer(np.asarray(level, float), factors).ravel()
@@ -239,11 +252,9 @@ class CoveredCells:
         """Memory [bytes]."""
         return self.coverage.nbytes + 5 * self.leaves.factor.nbytes
 
-    def averages(self, mix: Array) -> Array:
-        """Return the averages (R, rows, columns) over the cells in the colors of `mix` (R, 12)."""
-        out = np.empty((len(mix), *self.coverage.label.shape), mix.dtype)
+    def paint(self, mix: Array, out: Array) -> None:
+        """Write the averages (R, rows, columns) over the cells in the colors of `mix` (R, 12)."""
         self.coverage.paint(self.leaves.color(mix).astype(mix.dtype, copy=False), out)
-        return out
 
 
 @dataclass(frozen=True)
@@ -261,7 +272,6 @@ class DeadLeaves(Chart):
     whole grid is known."""
     divided = property(lambda self: divisions(self.cell_error))
     edge_seconds = property(lambda self: EDGE_SECONDS[0] + EDGE_SECONDS[1] * self.divided)
-    cell_bytes = CELL_BYTES
     undivided = property(lambda self: self.unit / UNDIVIDED)
 
     def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
@@ -318,14 +328,42 @@ class DeadLeaves(Chart):
         both = x_edges / self.unit, y_edges / self.unit
         cell, extent = max(np.diff(at).max() for at in both), max(np.ptp(at) for at in both)
         if reads_a_period(float(cell), float(extent)):
-            colors, columns = tuple(map(tuple, mix.tolist())), tuple((x_edges / self.unit).tolist())
-            known = _period_columns(self.seed, colors, mix.dtype, columns)
+            columns = x_edges / self.unit
+            known = _COLUMNS.get(
+                (self.seed, mix.tobytes(), mix.shape, mix.dtype, columns.tobytes()),
+                partial(_period_columns, self.seed, mix, columns),
+            )
             for plane, rows in zip(out, known, strict=True):
                 plane[:] = _periodic_averages(rows, y_edges / self.unit, 0)
         else:
             self._paint_parts(parts, x_edges, y_edges, mix, out)
         if hidden is not None:
             out[:, *hidden] = 0
+
+    def painting_bytes(self, cells: PaintedCells) -> int:
+        """Return the memory of temporary arrays of a thread, for cells and parts of them."""
+        parts = self._parts_of(cells.pitch)
+        divided = min(parts**2 * cells.count, AT_ONCE) if parts > 1 else 0
+        return cells.count * CELL_BYTES + divided * PART_BYTES
+
+    def kept_bytes(self, cells: PaintedCells) -> int:
+        """Return the memory of leaves that are seen on cells, and on those of one period.
+
+        What is in use while averages over columns are computed counts, too: the columns that are
+        kept, those of this grid, what is painted for them, and sums.
+        """
+        grid = cells.in_grid * self._parts_of(cells.pitch) ** 2
+        if not reads_a_period(cells.pitch / self.unit, max(cells.extent) / self.unit):
+            if grid > KEPT_CELLS:
+                return 0
+            # A line crosses 4 / pi as many cells as it is cells long.
+            crossed = min(4 / math.pi * OUTLINE * cells.pitch / self.unit, 1.0)
+            more = max(grid - cells.count, 0)  # than those that temporary arrays are counted with
+            return round(min((LABEL_BYTES + CROSSED_BYTES * crossed) * more, discs.KEPT))
+        columns = ROWS * cells.shape[1] * cells.values
+        sums = 4 * 8 * max(ROWS * cells.shape[1], AT_ONCE)
+        of_columns = max(COLUMNS, columns) + columns + AT_ONCE * cells.values + sums
+        return PERIOD_BYTES * ROWS**2 + of_columns
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the values at points."""
@@ -343,8 +381,11 @@ class DeadLeaves(Chart):
 
     def _parts(self, x_edges: Array, y_edges: Array) -> int:
         """Return into how many parts along each side cells are divided."""
-        largest = max(float(np.diff(edges).max()) for edges in (x_edges, y_edges))
-        return max(1, math.ceil(largest / self.unit * UNDIVIDED * (1 - 1e-9)))
+        return self._parts_of(max(float(np.diff(edges).max()) for edges in (x_edges, y_edges)))
+
+    def _parts_of(self, pitch: float) -> int:
+        """Return into how many parts along each side cells of a size [m] are divided."""
+        return max(1, math.ceil(pitch / self.unit * UNDIVIDED * (1 - 1e-9)))
 
     def _paint_parts(
         self, parts: int, x_edges: Array, y_edges: Array, mix: Array, out: Array
@@ -364,7 +405,7 @@ class DeadLeaves(Chart):
                 make = partial(
                     discs.painted_once, (x, y), (self.seed, self.unit, each.cell_error), make
                 )
-            cells[:] = make().averages(mix)
+            make().paint(mix, cells)
 
     def _covered(self, x_edges: Array, y_edges: Array, parts: int) -> "CoveredCells":
         """Return which leaves are seen where on cells, painted on `parts` of each side."""
@@ -402,27 +443,28 @@ def _divided(edges: Array, parts: int) -> Array:
     return np.append(inside.ravel(), edges[-1])
 
 
-@lru_cache(maxsize=2)
-def _period_columns(
-    seed: int, mix: tuple[tuple[float, ...], ...], dtype: np.dtype, x_edges: tuple[float, ...]
-) -> Array:
+def _period_columns(seed: int, mix: Array, x_edges: Array) -> Array:
     """Return averages over columns in each finest row of one period: (R, n, columns).
 
     Averages over all the finest cells would take eight times the memory of those over 192 columns.
     """
-    edges = cell_edges(round(PERIOD * FINEST), 1 / FINEST)
-    count, columns = len(edges) - 1, np.array(x_edges)
-    out = np.empty((len(mix), count, len(columns) - 1), dtype)
+    edges = cell_edges(ROWS, 1 / FINEST)
+    out = np.empty((len(mix), ROWS, len(x_edges) - 1), mix.dtype)
     leaves = DeadLeaves(seed, 1.0).crop_to_cells(edges, edges)
 
-    band = AT_ONCE // count
-    for top in range(0, count, band):
+    band = AT_ONCE // ROWS
+    painted = np.empty((len(mix), band, ROWS), mix.dtype)
+    for top in range(0, ROWS, band):
         y = edges[top : top + band + 1]
-        cells = np.empty((len(mix), len(y) - 1, count), dtype)
-        leaves.paint(edges, y, np.array(mix, dtype), cells)
+        cells = painted[:, : len(y) - 1]
+        leaves.paint(edges, y, mix, cells)
         for plane, fine in zip(out[:, top : top + band], cells, strict=True):
-            plane[:] = _periodic_averages(fine, columns, 1)
+            plane[:] = _periodic_averages(fine, x_edges, 1)
     return out
+
+
+_COLUMNS: ByteCache[Array] = ByteCache(COLUMNS)
+"""Averages over columns of the last rings of light."""
 
 
 def _periodic_averages(plane: Array, edges: Array, axis: int) -> Array:

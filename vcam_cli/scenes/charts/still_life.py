@@ -24,7 +24,7 @@ class LeavesWithColorChecker(Chart):
     leaves: DeadLeaves | PlacedLeaves
     card: Card
     edge_seconds = property(lambda self: self.leaves.edge_seconds)
-    cell_bytes = property(lambda self: self.leaves.cell_bytes)
+    painted = property(lambda self: self.leaves)
     undivided = property(lambda self: self.leaves.undivided)
 
     @property
