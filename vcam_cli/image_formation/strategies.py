@@ -27,6 +27,7 @@ from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.blurs import Blur, FieldTransfer, RadialTransfer, SeparableTransfer
 from vcam_cli.effects.warps import Warp
 from vcam_cli.floats import rms
+from vcam_cli.image_formation import transfer_tables
 from vcam_cli.image_formation.box_average import box_averages, point_values
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.estimates import memory_model
@@ -319,8 +320,9 @@ def _filter(path: OpticalPath, scene: SampledScene, tables: Tables, highest: flo
     `highest` is in pixel Nyquist frequencies.
     """
     x, y = axes(path, scene, highest)
-    # What is kept is small: no planes, and pieces of few terms.
-    made = _kept_filter if tables.is_radial and x.terms * y.terms <= KEPT else _made_filter
+    # What is kept is small, pieces of few terms, and of tables that will be the same again.
+    is_kept = tables.is_radial and tables.nbytes <= transfer_tables.KEPT
+    made = _kept_filter if is_kept and x.terms * y.terms <= KEPT else _made_filter
     return made(x, y, tables, path.separable, reach(path))
 
 

@@ -194,6 +194,12 @@ class SmoothMap:
         larger = np.sqrt(self._squared_scales[1])
         return float(larger.mean()), float(larger.max())
 
+    @property
+    def stretch(self) -> float:
+        """Larger scale over the lesser, in the mean over the rectangle."""
+        least, most = self._squared_scales
+        return float(np.sqrt(most / np.maximum(least, TINY)).mean())
+
     @cached_property
     def elongation(self) -> float:
         """Square of the larger scale over that of the lesser, less 1, where they differ most."""
@@ -292,7 +298,7 @@ class WarpedChart(Chart):
         parts = self._parts(cells.pitch)
         sides = (min(TILE, parts * n) * FINER + 2 * BEYOND + FINER for n in cells.shape)
         # Narrow squares along what cells see, where that is longer than wide.
-        long = min(math.sqrt(1 + self.sees.elongation), MOST_FINER)
+        long = min(self.sees.stretch, MOST_FINER)
         rows, columns = sides
         scale = self.sees.scales[0]
         return PaintedCells(

@@ -28,11 +28,11 @@ from vcam_cli.physics.pupil_harmonics import MOST
 from vcam_cli.scenes.bands import bands_of_rows
 from vcam_cli.scenes.base import ChartScene, PaintedCells, SampledScene
 
-BASE = 145_000_000
+BASE = 147_000_000
 """Interpreter and libraries of `vcam run`, 131 to 145 MB; a call of the library takes
 40 MB less [bytes]."""
-LATER = 12_000_000
-"""What of it is taken behind the light: 125 to 133 MB are taken before a chart is painted
+LATER = 10_000_000
+"""What of it is taken behind the light: 125 to 136 MB are taken before a chart is painted
 [bytes]."""
 HALVES, DISPARITY = 100, 170
 """What codes of both halves of a pixel take, and writing them and their disparity beside other
@@ -108,7 +108,8 @@ def image_bytes(
         held = max(held, samples + each * series * _series(path, part, filtered))
         x, y = axes(path, part, filtered)
         work = max(work, working_bytes(x, y, planes, colors, each))
-        painted = max(painted, round(SLACK * samples) + _painting_bytes(path, part, each * planes))
+        painting = _painting_bytes(path, part, each * planes)
+        painted = max(painted, round(SLACK * (samples + painting)))
     pixels = g.rows * g.columns
     filtering = round(SLACK * (held + pixels * width)) + path.workers * work
     return BASE + max(filtering, painted - LATER)

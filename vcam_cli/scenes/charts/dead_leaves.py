@@ -49,6 +49,8 @@ PERIOD_BYTES = 18
 """Memory of which leaf is seen in one of them, as measured [bytes]; all of them are kept."""
 COLUMNS = 1 << 25
 """Bytes of averages over columns that are kept: those of narrow rings, and the last ones."""
+RINGS = 3
+"""Rings of light that are read from sums over one period, as often as not."""
 UNDIVIDED = 600
 """Cells a side that are painted directly, at least. Where many leaves share a cell, telling which
 is seen where takes time and gigabytes: larger cells are divided. With 1000, eight layers of leaves
@@ -65,14 +67,16 @@ an rms of 6e-5 in single cells, and of 1e-3 in those beyond, which lenses blur b
 EDGE_SECONDS = 0.035, 0.0135
 """Core seconds to find the edges that a frame sees, and more for each division of cells,
 calibrated."""
-CELL_BYTES = 95
-"""Temporary arrays for each cell [bytes]: 12 to 110 were measured, most where a band sees half of
-the leaves of a frame. What libraries take less than is counted covers 15 of a band of 2^19 cells.
-"""
+PAINTING_BYTES = 8, 130, 180
+"""Temporary arrays of each cell, of each that an outline crosses, and of each in which two do, as
+often as it is looked at [bytes]: above those traced of ten seeds, 20 to 123 a cell with 700 to 1620
+cells a frame. Where a picture has many small leaves they are half as many again as in the mean."""
+SEEN_BYTES = 2, 20, 70
+"""What is kept of them of visible leaves [bytes], likewise above the 5 to 41 a cell traced."""
 PART_BYTES = 150
-"""The same of each part of cells that are painted in parts: 39 MB were taken of 255 744 of them."""
-LABEL_BYTES, CROSSED_BYTES = 2, 31
-"""What is kept of a cell, and of one that an outline crosses, as measured [bytes]."""
+"""Temporary arrays of each part of cells that are painted in parts: 39 MB of 255 744 of them."""
+MOST_SEEN_BYTES = 35
+"""What is kept of a cell that is painted in parts, whose leaves are counted once [bytes]."""
 OUTLINE = 2 * (1 / SMALLEST - 1 / LARGEST) / math.log(LARGEST / SMALLEST)
 """Visible outline on an area [1 / the frame's longer side], see `leaf_energy`."""
 DARKEST = 0.25
@@ -343,8 +347,12 @@ class DeadLeaves(Chart):
     def painting_bytes(self, cells: PaintedCells) -> int:
         """Return the memory of temporary arrays of a thread, for cells and parts of them."""
         parts = self._parts_of(cells.pitch)
-        divided = min(parts**2 * cells.count, AT_ONCE) if parts > 1 else 0
-        return cells.count * CELL_BYTES + divided * PART_BYTES
+        if parts > 1:
+            return min(parts**2 * cells.count, AT_ONCE) * PART_BYTES
+        crossed, divided = self._crossed(cells.pitch)
+        plain, once, twice = PAINTING_BYTES
+        each = plain + once * crossed + twice * (1 + divided) * crossed**2
+        return round(each * cells.count)
 
     def kept_bytes(self, cells: PaintedCells) -> int:
         """Return the memory of leaves that are seen on cells, and on those of one period.
@@ -352,18 +360,29 @@ class DeadLeaves(Chart):
         What is in use while averages over columns are computed counts, too: the columns that are
         kept, those of this grid, what is painted for them, and sums.
         """
-        grid = cells.in_grid * self._parts_of(cells.pitch) ** 2
+        parts, grid = self._parts_of(cells.pitch), cells.in_grid
         if not reads_a_period(cells.pitch / self.unit, max(cells.extent) / self.unit):
-            if grid > KEPT_CELLS:
+            if grid * parts**2 > KEPT_CELLS:
                 return 0
-            # A line crosses 4 / pi as many cells as it is cells long.
-            crossed = min(4 / math.pi * OUTLINE * cells.pitch / self.unit, 1.0)
-            more = max(grid - cells.count, 0)  # than those that temporary arrays are counted with
-            return round(min((LABEL_BYTES + CROSSED_BYTES * crossed) * more, discs.KEPT))
+            crossed, divided = self._crossed(cells.pitch)
+            plain, once, twice = SEEN_BYTES
+            each = plain + once * crossed + twice * (1 + divided) * crossed**2
+            # Those of the cells that are painted at once are counted with temporary arrays.
+            more = grid - (cells.count if parts == 1 else 0)
+            return round(min(min(each, MOST_SEEN_BYTES) * max(more, 0), discs.KEPT))
         columns = ROWS * cells.shape[1] * cells.values
         sums = 4 * 8 * max(ROWS * cells.shape[1], AT_ONCE)
-        of_columns = max(COLUMNS, columns) + columns + AT_ONCE * cells.values + sums
-        return PERIOD_BYTES * ROWS**2 + of_columns
+        kept = min(RINGS * columns, max(COLUMNS, columns))
+        return PERIOD_BYTES * ROWS**2 + kept + columns + AT_ONCE * cells.values + sums
+
+    def _crossed(self, pitch: float) -> tuple[float, int]:
+        """Return the share of cells of a size [m] that an outline crosses, and their divisions.
+
+        A line crosses 4 / pi as many cells as it is cells long.
+        """
+        cell = pitch / self.unit
+        divided = divisions(self.cell_error / max(cell * FINEST, 1.0))
+        return min(4 / math.pi * OUTLINE * cell, 1.0), divided
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the values at points."""
