@@ -149,11 +149,20 @@ def plan(
             f"{found.frames_per_second:.4g} frames/s, {most:.4g} at most: {found.readout.reason}"
         )
     if frames is not None and fps is not None:
-        from vcam_cli.simulation.sequence import frame_cameras, planned_seconds
+        from vcam_cli.simulation.sequence import frame_cameras, planned_memory, planned_seconds
 
-        next(frame_cameras(model, frames, fps))  # refuses exposures that do not fit
+        *_, last = frame_cameras(model, frames, fps)  # refuses exposures that do not fit
+        end = found
+        if model.scene.moves and frames > 1:
+            with Progress(quiet) as progress:
+                end = face.plan(last, workers, progress, details or geometry)
         whole, later = planned_seconds(found, frames)
-        report["sequence"] = {"frames": frames, "seconds": whole, "later_frame_seconds": later}
+        report["sequence"] = {
+            "frames": frames,
+            "seconds": whole,
+            "later_frame_seconds": later,
+            "memory_bytes": planned_memory(found, end),
+        }
     if device != "cpu":
         cost = found.device_cost()
         report["device_seconds"], report["device_start"] = cost.first, cost.start
@@ -249,7 +258,8 @@ def _sequence(report: dict[str, Any]) -> str:
     whole = report["sequence"]
     return (
         f"{whole['frames']} frames, about {whole['seconds']:.2g} s:"
-        f" {whole['later_frame_seconds']:.2g} s for each after the first, in the same memory"
+        f" {whole['later_frame_seconds']:.2g} s for each after the first;"
+        f" {whole['memory_bytes'] / 1e6:.0f} MB, the larger of first and last"
     )
 
 

@@ -270,6 +270,10 @@ class SampledScene(ABC):
         return ChangeBounds(0.0, [math.inf] * len(losses))
 
 
+SPARSE = 8_000_000
+"""Memory of SciPy's sparse matrices, and of what they import [bytes]."""
+
+
 @dataclass(frozen=True)
 class PaintedCells:
     """Cells of a chart that are painted at once, among those of a grid."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.parallel import pieces
-from vcam_cli.scenes.base import Chart, ChartScene, Frame, Scene, View
+from vcam_cli.scenes.base import Chart, ChartScene, Frame, PaintedCells, Scene, View
 from vcam_cli.scenes.cells import means_of_parts, window_extremes
 from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, total_energy
@@ -165,6 +165,11 @@ class LayerChart(Chart):
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
         """Write the averages over the cells."""
         self.layer.paint(x_edges - self.center[0], y_edges - self.center[1], mix, out)
+
+    def kept_bytes(self, cells: PaintedCells) -> int:
+        """Return the memory of what is kept, a copy of a picture with its opacity among it."""
+        copied = self.layer.picture.nbytes if isinstance(self.layer, PictureChart) else 0
+        return int(copied + self.layer.kept_bytes(cells))
 
     def sample_borders(self, x_edges: Array, y_edges: Array) -> tuple[Array, Array]:
         """Return where the layer may change within cells, in its place."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.parallel import product
-from vcam_cli.scenes.base import Chart, Frame
+from vcam_cli.scenes.base import SPARSE, Chart, Frame, PaintedCells
 from vcam_cli.scenes.cells import clip_cells
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, counted_height
 
@@ -47,6 +47,16 @@ class PictureChart(Chart):
         lines = lines.reshape(len(out[0]), -1, len(mix))
         for plane, one in zip(out, np.moveaxis(lines, 2, 0), strict=True):
             plane[:] = (across @ one.T).T
+
+    def painting_bytes(self, cells: PaintedCells) -> int:
+        """Return the memory of temporary arrays: rows of samples, mixed, and cells of a plane."""
+        _, width, channels = self.picture.shape
+        of_sample = self.picture.itemsize * channels + cells.values
+        return int(cells.shape[0] * width * of_sample + self.picture.itemsize * cells.count)
+
+    def kept_bytes(self, cells: PaintedCells) -> int:
+        """Return the memory of the library that shares samples among cells."""
+        return SPARSE
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the samples at points."""

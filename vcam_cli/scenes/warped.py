@@ -19,7 +19,7 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.parallel import pieces, product
-from vcam_cli.scenes.base import Chart, PaintedCells
+from vcam_cli.scenes.base import SPARSE, Chart, PaintedCells
 from vcam_cli.scenes.cells import cell_means
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region
 
@@ -290,8 +290,8 @@ class WarpedChart(Chart):
         return round(max(own, tile.values * tile.count + self.chart.painting_bytes(tile)))
 
     def kept_bytes(self, cells: PaintedCells) -> int:
-        """Return the memory of what the chart keeps of all tiles."""
-        return self.chart.kept_bytes(self._tile_cells(cells))
+        """Return the memory of what the chart keeps of all tiles, and of the library of splines."""
+        return SPARSE + self.chart.kept_bytes(self._tile_cells(cells))
 
     def _tile_cells(self, cells: PaintedCells) -> PaintedCells:
         """Return the cells of the chart that are painted for a tile."""

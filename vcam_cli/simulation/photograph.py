@@ -57,6 +57,13 @@ class Photograph:
             return self.process(self.frame.solved.processing)
 
     @property
+    def nbytes(self) -> int:
+        """Memory of the frame's arrays, and of the pictures that were made of it [bytes]."""
+        held = (*vars(self.frame).values(), *vars(self).values())
+        arrays = {id(one): one for one in held if isinstance(one, np.ndarray)}
+        return sum(array.nbytes for array in arrays.values())
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """What a user should know of the frame, and of a requested picture."""
         shown = needs_picture(self.frame.solved)

@@ -13,15 +13,19 @@ from dataclasses import replace
 
 import numpy as np
 
+from vcam_cli import memory
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.derived.line_times import line_times
+from vcam_cli.effects.base import of_kind
+from vcam_cli.effects.pixel_signal import Retention
 from vcam_cli.errors import bad
 from vcam_cli.files.folder import OutputFolder
 from vcam_cli.files.images.png import write_png
 from vcam_cli.files.images.video import VideoWriter, ffmpeg
 from vcam_cli.files.tables import write_table
+from vcam_cli.image_formation.estimates import memory_model
 from vcam_cli.image_formation.rate_cache import RateCache
 from vcam_cli.progress import Observer
 from vcam_cli.simulation import cost_model, exposure_control
@@ -116,18 +120,22 @@ def frames(
     settings, reference = None, camera.exposure.reference
     shared = Shared(RateCache(0 if camera.scene.moves else LIGHT))
     solved = solve(camera)
-    result: Result | None = None
+    lags, before = bool(of_kind(solved.effects.enabled, Retention)), None
     for each in frame_cameras(camera, count, rate):
         if settings is not None:
             each = exposure_control.set_exposure(each, settings)
             timed = each.exposure.model_copy(update={"reference": reference})
             each = each.model_copy(update={"exposure": timed})
-        result = simulate(each, workers, watch, shared, device, result)
+        result = simulate(each, workers, watch, shared, device, before)
         if camera.exposure.auto is not None:
             if reference is None:  # where the first frame has it, all others do
                 reference = result.exposure_time / 2 + solved.lines.last / 2
             settings = exposure_control.next_exposure(solved, result.frame)
         yield each, result
+        # What is not read again is not held beside the next frame.
+        before = result if lags else None
+        del result
+        memory.give_back()
 
 
 def planned_seconds(planned: PlannedRun, count: int) -> tuple[float, float]:
@@ -154,6 +162,23 @@ def planned_seconds(planned: PlannedRun, count: int) -> tuple[float, float]:
     once = not scene.moves or ready.solved.exposure.is_timed_by_scene
     later = max(first - light, 0.0) if once else first
     return first + (count - 1) * later, later
+
+
+def planned_memory(first: PlannedRun, last: PlannedRun) -> int:
+    """Return the estimated memory of a sequence: the larger of that of its ends.
+
+    Parameters
+    ----------
+    first, last : PlannedRun
+        Plans of the first frame, and of the last; the same where all see the same light.
+
+    Returns
+    -------
+    int
+        Memory [bytes], without the pictures that are held of the first frame.
+    """
+    ends = (each.ready.plan.memory_bytes for each in (first, last))
+    return max(ends) + memory_model.LATER
 
 
 def write_sequence(
@@ -186,23 +211,24 @@ def write_sequence(
     -------
     first : Result
         The first frame, with a note where there is no video.
-    memory : int
-        Largest estimated memory of a frame [bytes].
+    needed : int
+        Largest estimated memory of a frame, beside what is held of the first [bytes].
     """
-    rows, shown, memory = [], list[Array](), 0
+    rows, shown, needed = [], list[Array](), 0
     chosen = set(np.linspace(0, count - 1, min(count, STRIP)).round().astype(int).tolist())
     first: Result | None = None
     program = ffmpeg()
     with ExitStack() as stack:
         video: VideoWriter | None = None
-        for number, (each, result) in enumerate(
-            frames(camera, count, rate, workers, watch, device)
-        ):
+        for each, result in frames(camera, count, rate, workers, watch, device):
+            number = len(rows)  # `enumerate` would hold a frame beside the next one
             if first is None:
                 missing = bool(camera.output.render) and program is None
                 told = sequence_notes(result.remarks) + ((NO_VIDEO,) if missing else ())
                 result = first = replace(result, remarks=told)
-            memory = max(memory, result.frame.plan.memory_bytes)
+            # Later frames begin with all libraries, and beside what is held of the first.
+            held = 0 if result is first else first.nbytes + memory_model.LATER
+            needed = max(needed, result.frame.plan.memory_bytes + held)
             name = f"{number + 1:04d}"
             outputs.write_raw(result, folder.new(f"frames/raw_{name}.exr"))
             if camera.output.render:
@@ -215,15 +241,16 @@ def write_sequence(
                     video.write(render)
                 if number in chosen:
                     step = -(-render.shape[1] // STRIP_WIDTH)
-                    shown.append(render[::step, ::step])
+                    shown.append(render[::step, ::step].copy())
             columns = ("frame", "start [s]", "gain", "seed", *result.metrics)
             gain = result.frame.solved.gain
             facts = (number + 1, each.exposure.start, gain, each.seed.frame)
             rows.append((*facts, *result.metrics.values()))
+            del result
     assert first is not None
     if shown:
         write_png(
             folder.new("strip.png"), np.concatenate(shown, axis=1), f"{rate:g} frames a second"
         )
     write_table(folder.new("frames.csv"), columns, rows)
-    return first, memory
+    return first, needed

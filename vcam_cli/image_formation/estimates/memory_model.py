@@ -99,7 +99,7 @@ def image_bytes(
     waves = 4 if path.transfer.plane_blurs else waves
     series = colors * (waves + (2 if path.field_rings else 0))
     parts = [(width, scene), *((8, part.scene) for part in rings)]
-    painted = held = work = 0
+    painted = held = work = kept = 0
     for each, part in parts:
         samples = each * _samples(path, part, highest, planes)
         if part is not scene and isinstance(part, ChartScene) and part.is_painted:
@@ -108,11 +108,11 @@ def image_bytes(
         held = max(held, samples + each * series * _series(path, part, filtered))
         x, y = axes(path, part, filtered)
         work = max(work, working_bytes(x, y, planes, colors, each))
-        painting = _painting_bytes(path, part, each * planes)
-        painted = max(painted, round(SLACK * (samples + painting)))
+        painting, own = _painting_bytes(path, part, each * planes)
+        painted, kept = max(painted, samples + painting), max(kept, own)
     pixels = g.rows * g.columns
     filtering = round(SLACK * (held + pixels * width)) + path.workers * work
-    return BASE + max(filtering, painted - LATER)
+    return BASE + round(SLACK * kept) + max(filtering, round(SLACK * painted) - LATER)
 
 
 def device_bytes(path: OpticalPath, scene: SampledScene, highest: float, planes: int) -> int:
@@ -226,16 +226,16 @@ def _samples(path: OpticalPath, scene: SampledScene, highest: float, planes: int
     return 2 * (down * y.terms + along * x.terms) + planes * down * x.terms
 
 
-def _painting_bytes(path: OpticalPath, scene: SampledScene, values: int) -> int:
-    """Memory of bands of cells while they are painted, with `values` bytes a cell."""
+def _painting_bytes(path: OpticalPath, scene: SampledScene, values: int) -> tuple[int, int]:
+    """Memory of bands of cells while they are painted, with `values` bytes a cell, and then."""
     if not (isinstance(scene, ChartScene) and scene.is_painted):
-        return 0
+        return 0, 0
     rows, columns = scene.shape
     bands = bands_of_rows(rows, columns)
     pitch = max(scene.pitch_x, scene.pitch_y)
     band = PaintedCells((bands[0].stop, columns), pitch, scene.extent, values)
     of_thread = band.count * values + scene.chart.painting_bytes(band)
-    return min(path.workers, len(bands)) * of_thread + scene.chart.kept_bytes(band)
+    return min(path.workers, len(bands)) * of_thread, scene.chart.kept_bytes(band)
 
 
 def _series(path: OpticalPath, scene: SampledScene, highest: float) -> int:
