@@ -214,7 +214,7 @@ def write_sequence(
     needed : int
         Largest estimated memory of a frame, beside what is held of the first [bytes].
     """
-    rows, shown, needed = [], list[Array](), 0
+    rows, shown, needed = list[tuple[float, ...]](), list[Array](), 0
     chosen = set(np.linspace(0, count - 1, min(count, STRIP)).round().astype(int).tolist())
     first: Result | None = None
     program = ffmpeg()

@@ -192,7 +192,7 @@ def _radial_bytes(path: OpticalPath, planes: int, size: TableSize) -> int:
     at_once = min(len(path.transfer.wavelengths) * size.entries, transfer_functions.AT_ONCE)
     # kept, and the steps between its entries; those of the scene's bound are kept besides
     kept = min(8 * 2 * values, transfer_functions.KEPT + transfer_tables.KEPT)
-    return round(SLACK * (8 * 2 * values + max(kept, 8 * 2 * at_once)))
+    return round(SLACK * (8 * 2 * values + max(kept, 8 * (at_once + transfer_functions.VALUES))))
 
 
 def _harmonic_bytes(path: OpticalPath, transfers: int, size: TableSize) -> int:

@@ -117,7 +117,10 @@ class Card:
         block[:, ROWS, COLUMNS] = card
         down = np.concatenate([cover.rows, cover.down[None]]).astype(mix.dtype)
         across = np.concatenate([cover.columns, cover.across[None]]).astype(mix.dtype)
-        return np.stack([product(product(down.T, plane), across) for plane in block])
+        out = np.empty((len(mix), down.shape[1], across.shape[1]), mix.dtype)
+        for light, plane in zip(out, block, strict=True):  # a stack would hold all of it twice
+            light[:] = product(product(down.T, plane), across)
+        return out
 
     def add_light(self, cover: "Cover", mix: Array, out: Array) -> None:
         """Add the light of card and patches to `out`.

@@ -49,8 +49,6 @@ PERIOD_BYTES = 18
 """Memory of which leaf is seen in one of them, as measured [bytes]; all of them are kept."""
 COLUMNS = 1 << 25
 """Bytes of averages over columns that are kept: those of narrow rings, and the last ones."""
-RINGS = 3
-"""Rings of light that are read from sums over one period, as often as not."""
 UNDIVIDED = 600
 """Cells a side that are painted directly, at least. Where many leaves share a cell, telling which
 is seen where takes time and gigabytes: larger cells are divided. With 1000, eight layers of leaves
@@ -357,8 +355,8 @@ class DeadLeaves(Chart):
     def kept_bytes(self, cells: PaintedCells) -> int:
         """Return the memory of leaves that are seen on cells, and on those of one period.
 
-        What is in use while averages over columns are computed counts, too: the columns that are
-        kept, those of this grid, what is painted for them, and sums.
+        What is in use while averages over columns are computed counts, too: those of this grid, as
+        many of rings before it, what is painted for them, and sums.
         """
         parts, grid = self._parts_of(cells.pitch), cells.in_grid
         if not reads_a_period(cells.pitch / self.unit, max(cells.extent) / self.unit):
@@ -371,9 +369,8 @@ class DeadLeaves(Chart):
             more = grid - (cells.count if parts == 1 else 0)
             return round(min(min(each, MOST_SEEN_BYTES) * max(more, 0), discs.KEPT))
         columns = ROWS * cells.shape[1] * cells.values
-        sums = 4 * 8 * max(ROWS * cells.shape[1], AT_ONCE)
-        kept = min(RINGS * columns, max(COLUMNS, columns))
-        return PERIOD_BYTES * ROWS**2 + kept + columns + AT_ONCE * cells.values + sums
+        sums = 2 * 8 * max(ROWS * cells.shape[1], AT_ONCE)
+        return PERIOD_BYTES * ROWS**2 + 2 * columns + AT_ONCE * cells.values + sums
 
     def _crossed(self, pitch: float) -> tuple[float, int]:
         """Return the share of cells of a size [m] that an outline crosses, and their divisions.
