@@ -1,5 +1,7 @@
 """Dead leaves: discs in cells, one picture a seed, and natural statistics."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 import scipy.ndimage
@@ -9,7 +11,7 @@ from support import scene, view
 
 from vcam_cli.physics.cache import ByteCache
 from vcam_cli.scenes import disc_edges, discs
-from vcam_cli.scenes.base import Frame
+from vcam_cli.scenes.base import Frame, PaintedCells
 from vcam_cli.scenes.build import build
 from vcam_cli.scenes.cells import cell_edges, cell_means
 from vcam_cli.scenes.charts import dead_leaves
@@ -17,6 +19,24 @@ from vcam_cli.scenes.discs import Discs
 
 LEAVES = {"kind": "chart", "chart": "dead-leaves"}
 ONE = np.array([[0.0, 1.0]])
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(("in_frame", "rows", "columns"), [(904, 512, 1024), (1620, 303, 1728)])
+def test_painting_a_band_takes_what_is_stated(in_frame, rows, columns, seed):
+    """Of temporary arrays and what is kept of leaves; some pictures have fewer leaves."""
+    chart = dead_leaves.DeadLeaves(seed, 1.0, 2.5e-3, keep=True)
+    x, y = cell_edges(columns, 1 / in_frame), cell_edges(rows, 1 / in_frame)
+    out, mix = np.empty((3, rows, columns), np.float32), np.ones((3, 12), np.float32)
+    dead_leaves.generate_leaves(seed)
+    discs.forget()
+    tracemalloc.start()
+    chart.paint(x, y, mix, out)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    extent = columns / in_frame, rows / in_frame
+    cells = PaintedCells((rows, columns), 1 / in_frame, extent, 12)
+    assert peak <= chart.painting_bytes(cells) + chart.kept_bytes(cells) <= 2 * peak
 
 
 @pytest.mark.parametrize("radius", [0.07, 0.5, 3.0, 40.0])

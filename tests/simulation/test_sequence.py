@@ -1,6 +1,8 @@
 """Sequences: time goes on, temporal noise is new, the sensor stays."""
 
 import csv
+import gc
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -24,6 +26,18 @@ def test_the_first_frame_is_the_camera_s_own(tmp_path):
     made = camera(tmp_path, {"pixel.fpn": {"dsnu": "20 e"}})
     [first] = frame_cameras(made, 1, 30)
     assert simulate(first).electrons.tobytes() == simulate(made).electrons.tobytes()
+
+
+@pytest.mark.parametrize("lag", ["0 %", "2 %"])
+def test_a_frame_is_held_beside_the_next_where_its_charge_lags(lag, tmp_path):
+    made = camera(tmp_path, {"pixel.lag": lag, "effects": "all"})
+    taken = sequence.frames(made, 3, 30, 1, Silent())
+    _, result = next(taken)
+    frame = weakref.ref(result.frame)
+    del result
+    next(taken)
+    gc.collect()
+    assert (frame() is None) == (lag == "0 %")
 
 
 def test_noise_is_new_and_the_pattern_stays(tmp_path):
