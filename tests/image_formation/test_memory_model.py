@@ -147,9 +147,9 @@ def test_pictures_take_no_more_than_estimated(name, tmp_path):
     assert peak <= estimated <= 2.5 * peak, (estimated, peak)
 
 
-def run_memory(name: str, sets: list[str], out: Path) -> tuple[int, int]:
+def run_memory(name: str, sets: list[str], out: Path, *more: str) -> tuple[int, int]:
     """The forecast and the peak of `vcam run` [bytes]."""
-    options = [word for each in sets for word in ("--set", each)]
+    options = [*more, *(word for each in sets for word in ("--set", each))]
     command = [sys.executable, "-m", "vcam_cli.commands.main", "run", name, "-o", str(out), "-q"]
     subprocess.run([*command, "--workers", "1", *options], check=True, capture_output=True)
     record = json.loads((out / "run.json").read_text())
@@ -193,9 +193,10 @@ def test_the_forecast_of_a_run_is_near_its_peak(source, tmp_path):
 
 SHIPPED = (
     *("eev-44-82", "12mp-bayer", "cfa-bayer", "x3-stacked", "csf-color-0.35um", "kai-02170"),
-    *("double-gauss", "fisheye", "still-life", "everything"),
+    *("double-gauss", "fisheye", "still-life", "everything", "phone-double-gauss", "ar0132at"),
+    *("cfa-honeycomb", "low-light", "table-top", "lateral-color"),
 )
-"""Charge that is transported, comparisons, leaves, two lenses that distort."""
+"""Charge that is transported, comparisons, samples, leaves, lenses that distort, layers."""
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="peaks of processes are read as on POSIX")
@@ -205,6 +206,28 @@ SHIPPED = (
 )
 def test_the_forecast_of_a_shipped_camera_is_near_its_peak(name, tmp_path):
     forecast, peak = run_memory(name, [], tmp_path / "out")
+    assert peak <= forecast <= 1.2 * peak, (forecast, peak)
+
+
+@pytest.mark.long
+@pytest.mark.skipif(sys.platform == "win32", reason="peaks of processes are read as on POSIX")
+@pytest.mark.parametrize(
+    "name", ["colorchecker-d65", "still-life", "table-top", "fisheye", "phone-double-gauss"]
+)
+def test_the_forecast_of_few_pixels_at_reference_is_near_their_peak(name, tmp_path):
+    """Tables, rings of light and harmonics are most of what they take."""
+    sets = [*FEW, "accuracy=reference"]
+    forecast, peak = run_memory(name, sets, tmp_path / "out")
+    assert peak <= forecast <= 1.25 * peak, (forecast, peak)
+
+
+@pytest.mark.long
+@pytest.mark.skipif(sys.platform == "win32", reason="peaks of processes are read as on POSIX")
+@pytest.mark.parametrize("scene", ["street", "passing-car"])
+def test_the_forecast_of_a_sequence_is_near_its_peak(scene, tmp_path):
+    """Later frames are taken beside what is held of the first."""
+    frames = "--frames", "3", "--fps", "12"
+    forecast, peak = run_memory("street", [f"scene={scene}"], tmp_path / "out", *frames)
     assert peak <= forecast <= 1.2 * peak, (forecast, peak)
 
 
