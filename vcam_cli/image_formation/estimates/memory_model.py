@@ -196,7 +196,7 @@ def _radial_bytes(path: OpticalPath, planes: int, size: TableSize) -> int:
 
 
 def _harmonic_bytes(path: OpticalPath, transfers: int, size: TableSize) -> int:
-    """Return the memory of the harmonics of all rings of a field, for so many transfers each."""
+    """Return the memory of the harmonics of all rings of a field, by the transfers of each."""
     light = path.transfer.with_half_the_wavelengths().wavelengths
     held = most = 0
     for blur in of_kind([ring.blur for ring in path.field_rings], PlaneTransfer):
