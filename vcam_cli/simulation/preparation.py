@@ -196,9 +196,11 @@ def plan_frame(
         The camera, ready to take its frame.
     """
     solved = seen.solved.at_gain(exposed.settings.gain)
-    pixels, of_halves = solved.geometry.rows * solved.geometry.columns, 0
+    pixels, halves, written = solved.geometry.rows * solved.geometry.columns, 0, 0
     if exposed.halves is not None:
-        of_halves = half_image_bytes(pixels, solved.output.phase)
+        halves = half_image_bytes(pixels, False)
+        written = half_image_bytes(pixels, solved.output.phase)
+    of_light = max(light.spectrum.memory, exposed.memory) + halves
     decided = plan.make(
         solved.effects,
         solved.tolerance,
@@ -206,7 +208,7 @@ def plan_frame(
         solved.settings,
         exposed.light_plan,
         exposed.signal,
-        max(seen.memory, light.spectrum.memory, exposed.memory) + of_halves + seen.picture_memory,
+        max(seen.memory + written, of_light) + seen.picture_memory,
         light.spectrum.changes | exposed.changes,
     )
     if of_kind(exposed.effects, ImageMotion):  # every sample has light of its own
