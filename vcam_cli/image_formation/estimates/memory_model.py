@@ -99,20 +99,20 @@ def image_bytes(
     waves = 4 if path.transfer.plane_blurs else waves
     series = colors * (waves + (2 if path.field_rings else 0))
     parts = [(width, scene), *((8, part.scene) for part in rings)]
-    painted = held = work = kept = 0
-    for each, part in parts:
+    pixels, most, kept = g.rows * g.columns, 0, 0
+    for each, part in parts:  # one after the other, with what the scene's own cells keep
         samples = each * _samples(path, part, highest, planes)
         if part is not scene and isinstance(part, ChartScene) and part.is_painted:
             # as it is painted, which the next ring subtracts, and a copy that is transformed
             samples = (width + each) * planes * math.prod(part.shape)
-        held = max(held, samples + each * series * _series(path, part, filtered))
+        held = samples + each * series * _series(path, part, filtered) + pixels * width
         x, y = axes(path, part, filtered)
-        work = max(work, working_bytes(x, y, planes, colors, each))
+        work = path.workers * working_bytes(x, y, planes, colors, each)
         painting, own = _painting_bytes(path, part, each * planes)
-        painted, kept = max(painted, samples + painting), max(kept, own)
-    pixels = g.rows * g.columns
-    filtering = round(SLACK * (held + pixels * width)) + path.workers * work
-    return BASE + round(SLACK * kept) + max(filtering, round(SLACK * painted) - LATER)
+        kept = own if part is scene else kept
+        filtering, painted = round(SLACK * held) + work, round(SLACK * (samples + painting))
+        most = max(most, round(SLACK * max(own, kept)) + max(filtering, painted - LATER))
+    return BASE + most
 
 
 def device_bytes(path: OpticalPath, scene: SampledScene, highest: float, planes: int) -> int:
