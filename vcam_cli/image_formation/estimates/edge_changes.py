@@ -23,7 +23,7 @@ import scipy.fft
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import pixel_centers
-from vcam_cli.effects.base import Effect
+from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.blurs import Blur, FieldTransfer
 from vcam_cli.image_formation.field_dependence import Map, field_along, linear, map_position
 from vcam_cli.image_formation.optical_path import OpticalPath
@@ -254,9 +254,10 @@ def _added(
     color. None where a blur's transfer along one direction is not known by itself.
     """
     light = path.transfer
-    if not isinstance(blur, Blur):
+    uniform = of_kind([blur], Blur)
+    if not uniform:
         return field_along(light, path.field_rings, path.geometry, frequency, across)
-    otf = blur.spectral_otf_along(frequency, across, light.wavelengths)
+    otf = uniform[0].spectral_otf_along(frequency, across, light.wavelengths)
     return None if otf is None else (otf[None] - 1, None)
 
 
