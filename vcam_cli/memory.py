@@ -56,17 +56,6 @@ def peak_memory() -> int:
     return peak if sys.platform == "darwin" else peak * 1024
 
 
-def give_back() -> None:
-    """Give freed memory back to the system, where its C library can.
-
-    Else what is freed in small parts, between arrays that are kept, stays with the process.
-    """
-    import ctypes
-
-    with contextlib.suppress(OSError, AttributeError, TypeError):
-        ctypes.CDLL(None).malloc_trim(0)
-
-
 def limit_blas_threads() -> None:
     """Let a BLAS start no threads, unless the environment says how many.
 

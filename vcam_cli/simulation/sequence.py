@@ -13,7 +13,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from vcam_cli import memory
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
@@ -135,7 +134,6 @@ def frames(
         # What is not read again is not held beside the next frame.
         before = result if lags else None
         del result
-        memory.give_back()
 
 
 def planned_seconds(planned: PlannedRun, count: int) -> tuple[float, float]:

@@ -20,7 +20,6 @@ from functools import partial
 
 import numpy as np
 
-from vcam_cli import memory
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.camera.derived.mosaic import Mosaic
@@ -181,7 +180,6 @@ def _layers_seen(path: OpticalPath, scene: LayeredScene, form: FormImage) -> Ite
                 level = scene.brightest * path.transfer.level[-1, :, None, None]
                 changed = np.abs(light - half[0]) + level * np.abs(cover - half[1])
                 cut_rms = rms(changed)
-            memory.give_back()  # what this one took, before the next one takes as much
             yield SeenLayer(number, window, light, cover, own, beyond, report, cut_rms)
 
 
