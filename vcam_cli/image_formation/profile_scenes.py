@@ -74,15 +74,26 @@ def profile_layers(path: OpticalPath, profile: Profile) -> tuple[Layers, Spectru
     if max(edge.entries, 2 * edge.farthest / edge.step) > LONGEST:
         return None
     table, first = edge.table()
-    x, y, drifting = edge.pixel_distances()
+    x, y = (part / edge.step for part in edge.pixel_distances())
 
-    def values(color: int, rows: slice) -> Array:
-        """Return the signal of some rows; where all rows are alike it is that of one."""
-        y_rows = y[rows] if drifting else y[:1]
-        place = (x[None, :] + y_rows[:, None]) * (1 / edge.step)
+    def all_edges(color: int, place: Array) -> Array:
+        """Return the signal of a color at places across the edges [steps]."""
         signal: Array = np.full(place.shape, profile.levels[0] * edge.level[color])
         for height, at in zip(np.diff(profile.levels), profile.places, strict=True):
             signal += height * _linear(table[color], place - (at / edge.step + first))
+        return signal
+
+    if edge.rows_differ:  # every pixel looks up one table of all edges
+        lowest = math.floor(x.min() + y.min())
+        steps = np.arange(lowest, math.ceil(x.max() + y.max()) + 2)
+        tables = [all_edges(color, steps) for color in range(len(table))]
+
+    def values(color: int, rows: slice) -> Array:
+        """Return the signal of some rows; where all rows are alike it is that of one."""
+        if edge.rows_differ:
+            signal = _linear(tables[color], x + (y[rows, None] - lowest))
+        else:
+            signal = all_edges(color, x + y[:1, None])
         return np.broadcast_to(signal, (len(y[rows]), len(x))).astype(path.settings.dtype)
 
     report = SpectrumReport(changes=edge.changes(), peak=float(edge.level.max() * edge.brightest))
@@ -196,7 +207,7 @@ class EdgeImage:
     @cached_property
     def farthest(self) -> float:
         """Largest distance of a pixel from an edge [m]."""
-        x, y, _ = self.pixel_distances()
+        x, y = self.pixel_distances()
         ends = np.add.outer(np.array([x.min(), x.max()]), np.array([y.min(), y.max()]))
         places = self.profile.places
         return float(max(ends.max() - places.min(), places.max() - ends.min(), 0.0))
@@ -246,9 +257,10 @@ class EdgeImage:
     def refined(self) -> int:
         """Parts of a step, between whose ends straight lines lie closely enough.
 
-        They err by 1/8 h^2 times the second derivative.
+        They err by 1/8 h^2 times the second derivative, twice: in the table of an edge, and in that
+        of all edges.
         """
-        step = math.sqrt(8 * self.allowed / self._moment(2))
+        step = math.sqrt(4 * self.allowed / self._moment(2))
         return max(1, math.ceil(self.period / self.entries / step))
 
     @property
@@ -282,16 +294,21 @@ class EdgeImage:
         first = (1 - count) * self.refined
         return np.array([_refined(line, self.refined) for line in coarse]), first
 
-    def pixel_distances(self) -> tuple[Array, Array, bool]:
+    def pixel_distances(self) -> tuple[Array, Array]:
         """Return the parts of the pixels' distances across the edges from columns and rows [m].
 
-        With them, (columns,) and (rows,), comes whether rows differ.
+        They are (columns,) and (rows,).
         """
-        g = self.path.geometry
-        _, y = pixel_centers(g, detector=True)
+        _, y = pixel_centers(self.path.geometry, detector=True)
         along, down = self.path.seen_along(self.profile.across)
-        differ = abs(down) * math.hypot(g.sensor_width, g.sensor_height) > 1e-9 * g.pitch_y
-        return along, down * y if differ else np.zeros(len(y)), differ
+        return along, down * y if self.rows_differ else np.zeros(len(y))
+
+    @property
+    def rows_differ(self) -> bool:
+        """Whether rows see the edges at different columns."""
+        g = self.path.geometry
+        _, down = self.path.seen_along(self.profile.across)
+        return abs(down) * math.hypot(g.sensor_width, g.sensor_height) > 1e-9 * g.pitch_y
 
     def changes(self) -> dict[str, float]:
         """Return the rms change by leaving out each effect, in the color of most [e/s].

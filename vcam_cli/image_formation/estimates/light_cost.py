@@ -89,12 +89,13 @@ ENTRIES = 2560
 """Frequencies at which a round transfer function is known, for its tables and to judge them."""
 PLANES = 4
 """Mixtures that replace a scene's spectra, at most, as often as not."""
-PARITIES, MODES = 4, 4
-"""Filters of a blur with a direction, and of one that changes over the field, about."""
-FIELD = 0.08
+PARITIES, MODES, MODES_OF_EDGES = 4, 4, 2
+"""Filters of a blur with a direction, and of one that changes over the field, about: few parallel
+edges need fewer modes."""
+FIELD = 0.055
 """Finding the modes of a blur over the field up to the Nyquist frequency of the pixels, and by its
 square up to another [s]."""
-MODE = 50e-9
+MODE = 35e-9
 """One pixel of one further mode of the field: its map, and what its direction costs [s]."""
 SHEARED = 3
 """Cost of pixels whose rows see the scene at other places over that of others."""
@@ -301,12 +302,14 @@ def expected_report(
         return SpectrumReport()
     if not path.transfer.effects and not path.field and path.averages_over_box:
         return _averaged(path, scene)
-    if isinstance(scene, ChartScene) and scene.chart.profile() is not None and not path.field:
+    edges = isinstance(scene, ChartScene) and scene.chart.profile() is not None
+    if edges and not path.field:
         return SpectrumReport()
     planes = min(PLANES, len(path.transfer.weights))
     found = _sampled(path, scene, planes)
     directed = bool(path.transfer.plane_blurs)
-    filters = MODES if path.field else PARITIES if directed else 1
+    modes = MODES_OF_EDGES if edges else MODES
+    filters = modes if path.field else PARITIES if directed else 1
     return replace(
         found,
         planes=planes,
