@@ -92,7 +92,7 @@ PLANES = 4
 PARITIES, MODES, MODES_OF_EDGES = 4, 4, 2
 """Filters of a blur with a direction, and of one that changes over the field, about: few parallel
 edges need fewer modes."""
-FIELD = 0.055
+FIELD = 0.045
 """Finding the modes of a blur over the field up to the Nyquist frequency of the pixels, and by its
 square up to another [s]."""
 MODE = 35e-9
