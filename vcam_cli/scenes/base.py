@@ -39,8 +39,8 @@ class View:
     scene_width: [m] on the sensor when the scene's extent has a width, None when the scene covers
     the array; dtype of planes; cell_error: what means over a chart's cells may err, rms of white;
     covered: [m] width and height that a scene covers where a lens distorts, None for the array's;
-    sampling_scale: pitch of what photodetectors see over that of pixels, of which a chart is a
-    whole number long: its waves fold onto the pixels' then, which takes a quarter of the time.
+    sampling_scale: pitch of what photodetectors see over that of pixels. A chart is a whole number
+    of the former long: its waves fold onto the pixels', which takes a quarter of the time.
     """
 
     rows: int
