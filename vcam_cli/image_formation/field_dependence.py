@@ -80,7 +80,7 @@ class Map:
             Values (..., PLACES, n); between rows they are straight.
         """
         half = self.half_width if in_rows else self.half_height
-        sides = np.moveaxis(self.values, -1 if in_rows else -2, 0)
+        sides = np.ascontiguousarray(np.moveaxis(self.values, -1 if in_rows else -2, 0))
         return np.moveaxis(linear(sides, map_position(places, half)), 0, -1)
 
     def at(self, x: Array, y: Array) -> Array:

@@ -51,7 +51,7 @@ BLURS = (Blur, SeparableTransfer, FieldTransfer, Warp)
 """Kinds of effects that blur the light, or displace it."""
 KINDS = (*BLURS, Gain, VeilingGlare, NeighborSharing, ColumnSpread, Transport)
 """Kinds of effects on the light, and on the charge that it makes."""
-EXACT, EXACT_OVER_FIELD = 10e-3, 50e-3
+EXACT, EXACT_OVER_FIELD = 10e-3, 20e-3
 """Time that exact sums take of what a blur changes of edges, and one that changes over the field
 [s]: one that saves less is kept instead."""
 LOOSEST, LOOSEST_OVER_FIELD = 8.0, 24.0

@@ -239,7 +239,7 @@ def _group_squares(path: OpticalPath, group: EdgeGroup, blur: Blur | FieldTransf
         at_pixels = np.bincount(place, parts_of_pixels.ravel(), strips * size)
         at_strips = at_pixels.reshape(strips, size)
         if strips > len(group.counts):
-            squares[color] = np.square(_of_lines(path, group, at_strips)).sum()
+            squares[color] = _squares_of_lines(path, group, at_strips)
         else:
             squares[color] = np.square(at_strips).sum(axis=1) @ group.counts
     return squares
@@ -304,12 +304,23 @@ def _at_pixels(path: OpticalPath, group: EdgeGroup, maps: Map) -> Array:
     return maps.at(*((along, line) if group.in_rows else (line, along)))[:, None]
 
 
-def _of_lines(path: OpticalPath, group: EdgeGroup, at_rows: Array) -> Array:
-    """Return values at all lines of pixels (lines, n) from those at the rows of a map."""
+def _squares_of_lines(path: OpticalPath, group: EdgeGroup, at_rows: Array) -> float:
+    """Return the sum of squares at all lines of pixels from values (rows, n) at a map's rows.
+
+    Between two rows a and b a line has (1 - p) a + p b.
+    """
     x, y = pixel_centers(path.geometry)
     g = path.geometry
     lines, half = (y, g.sensor_height / 2) if group.in_rows else (x, g.sensor_width / 2)
-    return linear(at_rows, map_position(lines, half))
+    position = map_position(lines, half)
+    index = np.minimum(position.astype(int), len(at_rows) - 2)
+    part, before, behind = position - index, at_rows[:-1], at_rows[1:]
+    shares = (1 - part) ** 2, 2 * part * (1 - part), part**2
+    products = (before, before), (before, behind), (behind, behind)
+    return sum(
+        float(np.bincount(index, share, len(before)) @ np.einsum("rn,rn->r", *both))
+        for share, both in zip(shares, products, strict=True)
+    )
 
 
 def _waves(parts: Array, f: Array, places: Array) -> Array:
