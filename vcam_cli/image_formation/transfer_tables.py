@@ -158,7 +158,7 @@ class Tables:
         return self.shape[1]
 
     @cached_property
-    def seen(self) -> Array:
+    def is_seen(self) -> Array:
         """Which mixtures each color sees (R, C)."""
         parts = [part for part in (self.radial, *self.planes) if part is not None]
         seen = [part.reshape(*self.shape, -1).any(axis=2) for part in parts]
@@ -167,13 +167,13 @@ class Tables:
     @property
     def pairs(self) -> list[Pair]:
         """Mixtures that a color sees together, and each with itself."""
-        together = self.seen @ self.seen.T
+        together = self.is_seen @ self.is_seen.T
         return [(r, s) for r, s in pairs(len(together)) if r == s or together[r, s]]
 
     @cached_property
     def planes_by_color(self) -> list[tuple[Array, slice]]:
         """Mixtures (n,) that consecutive colors see, and these colors; none that see nothing."""
-        seen = self.seen
+        seen = self.is_seen
         starts = np.flatnonzero(np.append(True, (seen[:, 1:] != seen[:, :-1]).any(axis=0)))
         spans = zip(starts, np.append(starts[1:], self.colors), strict=True)
         found = ((np.flatnonzero(seen[:, a]), slice(int(a), int(b))) for a, b in spans)

@@ -25,10 +25,10 @@ from vcam_cli.physics.ray_spot import RaySpot
 from vcam_cli.physics.zernike import DEFOCUS, Terms
 
 GREEN = 550e-9
+"""Wavelength that descriptions refer to [m]."""
 FEW_HARMONICS = 64
 """Harmonics of the direction of wavefronts of few waves: up to 73 are seen where slopes are
 steepest, half as many in the mean over the rings."""
-"""Wavelength that descriptions refer to [m]."""
 SURE_OF_SLOPE = 1.02
 """Factor on the largest slope of a wavefront, which is found to about 1 %."""
 MANY_WAVES = 0.18

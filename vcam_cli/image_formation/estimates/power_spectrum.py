@@ -142,7 +142,7 @@ class PowerSpectrum:
         for parity in tables.parities:
             values = _at_centers(tables, parity, self.x, self.y)
             for (r, s), squares in zip(self.pairs, self.products, strict=True):
-                both = tables.seen[r] & tables.seen[s]
+                both = tables.is_seen[r] & tables.is_seen[s]
                 power[both] += values[r, both] * values[s, both] * squares
         return np.maximum(power, 0)
 

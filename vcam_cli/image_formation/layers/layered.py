@@ -320,7 +320,7 @@ def _layer_path(
     window = _window(g, part, math.inf if is_spread else far)
     if 0 in window.pixels:
         return None
-    beyond = (most, most) if is_spread or wanted > most else _beyond(g, part, window, most)
+    beyond = (most, most) if is_spread or wanted > most else _chart_margin(g, part, window, most)
     # What is lost of the layer's detail may all lie on the array, none of it beside it.
     knobs = replace(knobs, tolerance=tolerance * math.sqrt(_share_seen(window, beyond)))
     transfer = path.transfer.with_half_the_wavelengths()
@@ -418,7 +418,7 @@ def _window(g: Geometry, part: LayerPart, beyond: float) -> Window:
     return Window(*spans)
 
 
-def _beyond(g: Geometry, part: LayerPart, window: Window, most: int) -> tuple[int, int]:
+def _chart_margin(g: Geometry, part: LayerPart, window: Window, most: int) -> tuple[int, int]:
     """Return the rows and columns by which a chart is to go on beyond a window.
 
     At its end it is mirrored: all light that is there or in the mirror has to be farther from the

@@ -46,7 +46,7 @@ FINEST = 1000
 ROWS = round(PERIOD * FINEST)
 """Rows, and columns, of these cells."""
 PERIOD_BYTES = 18
-"""Memory of which leaf is seen in one of them, as measured [bytes]; all of them are kept."""
+"""Memory that each of these cells takes for its visible leaves, as measured [bytes]."""
 COLUMNS = 1 << 25
 """Bytes of averages over columns that are kept: those of narrow rings, and the last ones."""
 UNDIVIDED = 600
