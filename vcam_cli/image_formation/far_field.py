@@ -248,7 +248,7 @@ def near_field(path: OpticalPath, scene: ChartScene, widest: float) -> ChartScen
     distance = max(NEAR / cutoff, directed_tail_length(path)) + widest
     distance = max(distance, LEAST_PART * min(g.sensor_width, g.sensor_height))
     # A whole number of what pixels see: waves fold onto theirs.
-    pitch_x, pitch_y = (g.sampling_scale * pitch for pitch in (g.pitch_x, g.pitch_y))
+    pitch_x, pitch_y = g.collecting_pitch
     margin = fast_margin(g, max(math.ceil(distance / min(pitch_x, pitch_y)), LEAST_PIXELS))
     width, height = (g.columns + 2 * margin) * pitch_x, (g.rows + 2 * margin) * pitch_y
     if 2 * width * height > math.prod(scene.extent):

@@ -93,9 +93,9 @@ class FineImage:
             Signal in that shape, on the device [e/s].
         """
         g = self.geometry
-        pitches = g.pitch_x * g.sampling_scale, g.pitch_y * g.sampling_scale
-        column = (x - g.collecting_x) / pitches[0] + (g.columns - 1) / 2
-        row = (y - g.collecting_y) / pitches[1] + (g.rows - 1) / 2
+        pitch_x, pitch_y = g.collecting_pitch
+        column = (x - g.collecting_x) / pitch_x + (g.columns - 1) / 2
+        row = (y - g.collecting_y) / pitch_y + (g.rows - 1) / 2
         put = self.device.put
         return self.device.interpolated(self.coefficients[color], put(row), put(column))
 

@@ -81,6 +81,11 @@ class Geometry:
     """Area of the aperture over that of the circle that the f-number counts."""
 
     @property
+    def collecting_pitch(self) -> tuple[float, float]:
+        """Pitch of the collecting areas along x and y [m]."""
+        return self.pitch_x * self.sampling_scale, self.pitch_y * self.sampling_scale
+
+    @property
     def image_distance(self) -> float:
         """Distance from the lens to the sensor."""
         return float(radiometry.image_distance(self.focal_length, self.magnification))

@@ -352,7 +352,7 @@ def axes(path: OpticalPath, scene: SampledScene, highest: float) -> tuple[Axis, 
         bandwidth = min(highest * 0.5 / pixel, cutoff)
         return _axis(samples, pitch, pixels, seen * pixel, first, squares, bandwidth)
 
-    pitch_x, pitch_y = g.pitch_x * g.sampling_scale, g.pitch_y * g.sampling_scale
+    pitch_x, pitch_y = g.collecting_pitch
     x = axis(nx, scene.pitch_x, g.columns, pitch_x, g.collecting_x, moved_x)
     y = axis(ny, scene.pitch_y, g.rows, pitch_y, g.collecting_y, moved_y, 1 - drift_y)
     if drift_x:
