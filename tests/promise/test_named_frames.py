@@ -33,6 +33,7 @@ import pytest
         # tables finds that, too
         pytest.param("layers", "200076", marks=pytest.mark.long),
         ("layers", "100039"),  # 1.02 T: of 20 pixels two sums differed by little
+        ("lone", "630033"),  # 1.07 T: a lens was read in the middle of blocks of its spectrum
     ],
 )
 def test_a_frame_keeps_every_tolerance(kind, name, tmp_path):

@@ -1,9 +1,10 @@
 """What a scene's spectrum holds, and what filters leave of it: mean squares by Parseval's theorem.
 
 Coefficients are summed as products of planes over blocks of neighboring frequencies: exactly, in
-one pass over the whole spectrum. A transfer function is then judged at the blocks' centers, a few
-thousand in place of millions of terms. Mean squares are those of the continuous signal, before it
-is sampled by the pixels.
+one pass over the whole spectrum. A transfer function is then read at the ends and in the middle of
+each block, and the largest of what it passes holds for all of the block: a few thousand values in
+place of millions of terms. Mean squares are those of the continuous signal, before it is sampled by
+the pixels.
 """
 
 from __future__ import annotations
@@ -39,9 +40,13 @@ class Blocks:
     """(n,) highest frequency of every block of terms [cycles/m]."""
 
     @property
-    def center(self) -> Array:
-        """Frequencies (n,) in the middle of the blocks [cycles/m]."""
-        return (self.low + self.high) / 2
+    def places(self) -> tuple[Array, Array, Array]:
+        """Frequencies (n,) at the lower ends of the blocks, in their middle, at their upper ends.
+
+        A transfer function falls steeply next to its cut-off: read in the middle of the blocks
+        alone, a lone sample behind f/1.7 lost 1.2 times as much as was stated. [cycles/m]
+        """
+        return self.low, (self.low + self.high) / 2, self.high
 
 
 @lru_cache(64)
@@ -73,8 +78,8 @@ def blocks(axis: Axis) -> Blocks:
     inside = np.concatenate(low) < axis.terms
     start, stop = np.concatenate(low)[inside], np.concatenate(high)[inside]
     stop = np.minimum(stop, axis.terms - 1)
-    box = np.sinc((start + stop) / (4 * axis.samples))
-    weight = np.square((box if axis.squares else 1 / box) / (2 * axis.samples))
+    box = np.sinc(np.array([start, (start + stop) / 2, stop]) / (2 * axis.samples))
+    weight = np.square((box if axis.squares else 1 / box) / (2 * axis.samples)).max(axis=0)
     weight *= np.where(start > 0, 2, 1)
     target = np.searchsorted(_starts(axis.terms), start, side="right") - 1
     merged = np.flatnonzero(np.diff(target, prepend=-1))
@@ -138,13 +143,16 @@ class PowerSpectrum:
         Array
             Mean squares (C, blocks along y, blocks along x) [(e/s)^2].
         """
-        power = np.zeros((tables.colors, len(self.y.low), len(self.x.low)))
-        for parity in tables.parities:
-            values = _at_centers(tables, parity, self.x, self.y)
-            for (r, s), squares in zip(self.pairs, self.products, strict=True):
-                both = tables.is_seen[r] & tables.is_seen[s]
-                power[both] += values[r, both] * values[s, both] * squares
-        return np.maximum(power, 0)
+        largest = np.zeros((tables.colors, len(self.y.low), len(self.x.low)))
+        by_parity = [_values(tables, parity, self.x, self.y) for parity in tables.parities]
+        for at_place in zip(*by_parity, strict=True):
+            power = np.zeros(largest.shape)
+            for values in at_place:
+                for (r, s), squares in zip(self.pairs, self.products, strict=True):
+                    both = tables.is_seen[r] & tables.is_seen[s]
+                    power[both] += values[r, both] * values[s, both] * squares
+            np.maximum(largest, power, out=largest)
+        return largest
 
     def pixel_power(self, power: Array) -> Array:
         """Return mean squares behind the separable transfer functions.
@@ -176,7 +184,7 @@ class PowerSpectrum:
         Array
             Mean squares (C, blocks along y, blocks along x) [(e/s)^2].
         """
-        values = np.abs(_at_centers(tables, 0, self.x, self.y))
+        values = np.abs(_values(tables, 0, self.x, self.y)).max(axis=0)
         own = [p for (r, s), p in zip(self.pairs, self.products, strict=True) if r == s]
         amplitudes = values * np.sqrt(np.maximum(own, 0))[:, None]
         return self.pixel_power(np.square(amplitudes.sum(axis=0)))
@@ -197,8 +205,10 @@ class PowerSpectrum:
             Mean squares (C,) [(e/s)^2].
         """
         others = self._separable_squares([e for e in self.separable if e is not effect])
-        own = np.outer(effect.along_y(self.y.center), effect.along_x(self.x.center))
-        return np.asarray((power * (others * np.square(1 - own))).sum(axis=(1, 2)))
+        ends = zip(self.y.places, self.x.places, strict=True)
+        own = [np.outer(effect.along_y(fy), effect.along_x(fx)) for fy, fx in ends]
+        lost = np.square(1 - np.array(own)).max(axis=0)
+        return np.asarray((power * (others * lost)).sum(axis=(1, 2)))
 
     def _separable_squares(self, effects: Sequence[SeparableTransfer]) -> Array:
         """Return the largest squares of separable transfer functions in the blocks."""
@@ -267,14 +277,15 @@ class PowerSpectrum:
         return frequency, np.array(left)
 
 
-def _at_centers(tables: Tables, parity: int, x: Blocks, y: Blocks) -> Array:
-    """Return tables in the middle of the blocks (R, C, blocks along y, blocks along x) [e/s]."""
+def _values(tables: Tables, parity: int, x: Blocks, y: Blocks) -> Array:
+    """Return tables at the `places` of the blocks (3, R, C, blocks along y, along x) [e/s]."""
     read = _read_radial if tables.is_radial else _read_tables
     return read(tables, parity, x, y)
 
 
 def _read_tables(tables: Tables, parity: int, x: Blocks, y: Blocks) -> Array:
-    return reader(tables, parity, x.center).values(y.center)
+    ends = zip(y.places, x.places, strict=True)
+    return np.array([reader(tables, parity, fx).values(fy) for fy, fx in ends])
 
 
 _read_radial = lru_cache(4)(_read_tables)
@@ -298,8 +309,7 @@ def _shells(x: Blocks, y: Blocks, pitch: tuple[float, float]) -> tuple[Array, Ar
 
 def _largest(transfer: Callable[[Array], Array], blocks: Blocks) -> Array:
     """Return the largest square of a transfer function along one axis in every block."""
-    ends = [transfer(f) for f in (blocks.low, blocks.center, blocks.high)]
-    return np.asarray(np.square(ends).max(axis=0))
+    return np.asarray(np.square([transfer(f) for f in blocks.places]).max(axis=0))
 
 
 def power_spectrum(
