@@ -227,6 +227,21 @@ def test_no_lens_with_coma_passes_more_than_the_most():
     assert (passed <= limit * (1 + 1e-6) + 1e-9 * limit.max()).all()
 
 
+@pytest.mark.parametrize("name", AXES)
+def test_what_is_lost_next_to_a_cutoff_is_never_understated(name):
+    """A lens that ends at the last term passes most at the lower ends of blocks; lines of noise."""
+    x, y = AXES[name]
+    plane = np.repeat(planes_of(x, y)[:, :1], y.samples, axis=1)
+    top = x.frequencies[-1]
+    power = power_spectrum(transform_planes(plane.copy(), 1), x, y, (), 1)
+    squares = power.largest_power(lens((1 - np.linspace(0, 1, 4001))[None, None], top))
+    every = np.square(amplitudes(plane[0], x, y)[0] * (1 - x.frequencies / top))
+    for frequency in power.x.high[:-1]:
+        exact = np.sqrt(every[x.frequencies > frequency * (1 + 1e-9)].sum())
+        told = power.tail_rms(squares, frequency / NYQUIST, (PITCH, PITCH))
+        assert exact <= told * (1 + 1e-6)
+
+
 def test_what_is_lost_without_an_effect():
     """Leaving out an aperture adds what it would have taken: against the sum over all terms."""
     x, y = AXES["squares below it"]

@@ -106,7 +106,7 @@ def needed_modes(
     """
     squares = np.array(
         [
-            mode.map.mean_square * image.rms(image.power.filtered_power(mode.tables())) ** 2
+            mode.map.mean_square * image.rms(image.power.largest_power(mode.tables())) ** 2
             for mode in modes
         ]
     )

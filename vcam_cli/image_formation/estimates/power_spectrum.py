@@ -1,9 +1,9 @@
 """What a scene's spectrum holds, and what filters leave of it: mean squares by Parseval's theorem.
 
 Coefficients are summed as products of planes over blocks of neighboring frequencies: exactly, in
-one pass over the whole spectrum. A transfer function is then read at the ends and in the middle of
-each block, and the largest of what it passes holds for all of the block: a few thousand values in
-place of millions of terms. Mean squares are those of the continuous signal, before it is sampled by
+one pass over the whole spectrum. A transfer function is then read in the middle of each block, a
+few thousand values in place of millions of terms; what drops light reads it at the blocks' ends,
+too, and takes the largest. Mean squares are those of the continuous signal, before it is sampled by
 the pixels.
 """
 
@@ -34,6 +34,8 @@ class Blocks:
     """(b + 1,) first coefficients of blocks of the samples' spectrum, from 0, and the end."""
     weights: Array
     """(n, b) from squares of those coefficients to mean squares of the terms in every block."""
+    largest_weights: Array
+    """The same, where a square of light passes most in a block."""
     low: Array
     """(n,) lowest frequency of every block of terms [cycles/m]."""
     high: Array
@@ -41,11 +43,7 @@ class Blocks:
 
     @property
     def places(self) -> tuple[Array, Array, Array]:
-        """Frequencies (n,) at the lower ends of the blocks, in their middle, at their upper ends.
-
-        A transfer function falls steeply next to its cut-off: read in the middle of the blocks
-        alone, a lone sample behind f/1.7 lost 1.2 times as much as was stated. [cycles/m]
-        """
+        """Frequencies (n,) at the lower ends of blocks, in the middle, at the upper ends [1/m]."""
         return self.low, (self.low + self.high) / 2, self.high
 
 
@@ -79,16 +77,18 @@ def blocks(axis: Axis) -> Blocks:
     start, stop = np.concatenate(low)[inside], np.concatenate(high)[inside]
     stop = np.minimum(stop, axis.terms - 1)
     box = np.sinc(np.array([start, (start + stop) / 2, stop]) / (2 * axis.samples))
-    weight = np.square((box if axis.squares else 1 / box) / (2 * axis.samples)).max(axis=0)
+    weight = np.square((box if axis.squares else 1 / box) / (2 * axis.samples))
     weight *= np.where(start > 0, 2, 1)
     target = np.searchsorted(_starts(axis.terms), start, side="right") - 1
     merged = np.flatnonzero(np.diff(target, prepend=-1))
-    weights = np.zeros((len(merged), len(starts)))
     row = np.cumsum(np.diff(target, prepend=-1) > 0) - 1
-    np.add.at(weights, (row, np.concatenate(source)[inside]), weight)
+    both = []
+    for each in (weight[1], weight.max(axis=0)):
+        both.append(np.zeros((len(merged), len(starts))))
+        np.add.at(both[-1], (row, np.concatenate(source)[inside]), each)
     step = 1 / (2 * axis.length)
     edges = np.append(starts, count)
-    return Blocks(edges, weights, start[merged] * step, np.maximum.reduceat(stop, merged) * step)
+    return Blocks(edges, *both, start[merged] * step, np.maximum.reduceat(stop, merged) * step)
 
 
 @lru_cache(1 << 7)
@@ -111,6 +111,8 @@ class PowerSpectrum:
     y: Blocks
     products: Array
     """(pairs, blocks along y, blocks along x) of planes (r, s), r <= s, twice where they differ."""
+    largest_products: Array
+    """The same, where a square of light passes most in a block."""
     pairs: Sequence[Pair]
     """Those planes: all that any color sees together."""
     separable: tuple[SeparableTransfer, ...]
@@ -143,16 +145,7 @@ class PowerSpectrum:
         Array
             Mean squares (C, blocks along y, blocks along x) [(e/s)^2].
         """
-        largest = np.zeros((tables.colors, len(self.y.low), len(self.x.low)))
-        by_parity = [_values(tables, parity, self.x, self.y) for parity in tables.parities]
-        for at_place in zip(*by_parity, strict=True):
-            power = np.zeros(largest.shape)
-            for values in at_place:
-                for (r, s), squares in zip(self.pairs, self.products, strict=True):
-                    both = tables.is_seen[r] & tables.is_seen[s]
-                    power[both] += values[r, both] * values[s, both] * squares
-            np.maximum(largest, power, out=largest)
-        return largest
+        return self._passed(tables, self.products)[1]
 
     def pixel_power(self, power: Array) -> Array:
         """Return mean squares behind the separable transfer functions.
@@ -168,6 +161,34 @@ class PowerSpectrum:
             Mean squares (C, blocks along y, blocks along x) [(e/s)^2].
         """
         return power * self._separable_squares(self.separable)
+
+    def largest_power(self, tables: Tables) -> Array:
+        """Return mean squares of every color's signal, each block where it passes most light.
+
+        A transfer function falls steeply next to its cut-off: read in the middle of the blocks
+        alone, a lone sample behind f/1.7 lost 1.2 times as much as was stated.
+
+        Parameters
+        ----------
+        tables : Tables
+            Transfer functions of the lens.
+
+        Returns
+        -------
+        Array
+            Mean squares (C, blocks along y, blocks along x) [(e/s)^2].
+        """
+        return self.pixel_power(self._passed(tables, self.largest_products).max(axis=0))
+
+    def _passed(self, tables: Tables, products: Array) -> Array:
+        """Return what a lens passes at the `places` of the blocks (3, C, along y, along x)."""
+        power = np.zeros((3, tables.colors, len(self.y.low), len(self.x.low)))
+        for parity in tables.parities:
+            values = _values(tables, parity, self.x, self.y)
+            for (r, s), squares in zip(self.pairs, products, strict=True):
+                both = tables.is_seen[r] & tables.is_seen[s]
+                power[:, both] += values[:, r, both] * values[:, s, both] * squares
+        return np.maximum(power, 0)
 
     def upper_bound(self, tables: Tables) -> Array:
         """Return mean squares that no lens exceeds whose radial part is given.
@@ -185,7 +206,8 @@ class PowerSpectrum:
             Mean squares (C, blocks along y, blocks along x) [(e/s)^2].
         """
         values = np.abs(_values(tables, 0, self.x, self.y)).max(axis=0)
-        own = [p for (r, s), p in zip(self.pairs, self.products, strict=True) if r == s]
+        every = zip(self.pairs, self.largest_products, strict=True)
+        own = [squares for (r, s), squares in every if r == s]
         amplitudes = values * np.sqrt(np.maximum(own, 0))[:, None]
         return self.pixel_power(np.square(amplitudes.sum(axis=0)))
 
@@ -205,10 +227,8 @@ class PowerSpectrum:
             Mean squares (C,) [(e/s)^2].
         """
         others = self._separable_squares([e for e in self.separable if e is not effect])
-        ends = zip(self.y.places, self.x.places, strict=True)
-        own = [np.outer(effect.along_y(fy), effect.along_x(fx)) for fy, fx in ends]
-        lost = np.square(1 - np.array(own)).max(axis=0)
-        return np.asarray((power * (others * lost)).sum(axis=(1, 2)))
+        own = np.outer(effect.along_y(self.y.places[1]), effect.along_x(self.x.places[1]))
+        return np.asarray((power * (others * np.square(1 - own))).sum(axis=(1, 2)))
 
     def _separable_squares(self, effects: Sequence[SeparableTransfer]) -> Array:
         """Return the largest squares of separable transfer functions in the blocks."""
@@ -226,7 +246,7 @@ class PowerSpectrum:
         Parameters
         ----------
         power : Array
-            Mean squares (C, ...) from `filtered_power` or `upper_bound` [(e/s)^2].
+            Mean squares (C, ...) from `largest_power` or `upper_bound` [(e/s)^2].
         budget : float
             Rms that may be left at the pixels [e/s].
         pitch : tuple of float
@@ -247,7 +267,7 @@ class PowerSpectrum:
         Parameters
         ----------
         power : Array
-            Mean squares (C, ...) from `filtered_power` or `upper_bound` [(e/s)^2].
+            Mean squares (C, ...) from `largest_power` or `upper_bound` [(e/s)^2].
         frequency : float
             Frequency [pixel Nyquist].
         pitch : tuple of float
@@ -341,11 +361,16 @@ def power_spectrum(
         Mean squares by block of terms.
     """
     along_x, along_y = blocks(x), blocks(y)
-    products = []
+    products, largest = [], []
     every = of or pairs(len(spectrum))
     sums = spectrum.products(along_y.edges, along_x.edges, workers, every)
     for (r, s), of_pair in zip(every, sums, strict=True):
         twice = 1 if r == s else 2
-        squares = product(along_y.weights, product(of_pair, along_x.weights.T))
-        products.append(twice * squares)
-    return PowerSpectrum(along_x, along_y, np.array(products), every, tuple(separable))
+        for found, y_weights, x_weights in (
+            (products, along_y.weights, along_x.weights),
+            (largest, along_y.largest_weights, along_x.largest_weights),
+        ):
+            found.append(twice * product(y_weights, product(of_pair, x_weights.T)))
+    return PowerSpectrum(
+        along_x, along_y, np.array(products), np.array(largest), every, tuple(separable)
+    )
