@@ -14,7 +14,7 @@ that are separable in x and y (the pixel aperture) are kept apart: they multiply
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -88,14 +88,9 @@ class Transfer:
         return tuple(e for e in self.plane_blurs if e not in self.geometric_blurs)
 
     @cached_property
-    def key(self) -> Hashable | None:
-        """All that it consists of; None where an effect has no hash."""
-        key = self.wavelengths.tobytes(), self.weights.tobytes(), self.weights.shape, self.effects
-        try:
-            hash(key)
-        except TypeError:
-            return None
-        return key
+    def key(self) -> object:
+        """All that it consists of, for a cache; effects may be without a hash."""
+        return self.wavelengths.tobytes(), self.weights.tobytes(), self.weights.shape, self.effects
 
     def radial_response(self, frequency: Array) -> Array:
         """Return H_kc through the radial blurs alone.
@@ -123,8 +118,6 @@ class Transfer:
             return found
 
         radial = replace(self, effects=self.radial_blurs).key
-        if radial is None:
-            return compute()
         return _RESPONSES.get((radial, frequency.shape, frequency.tobytes()), compute)
 
     def plane_response(self, fx: Array, fy: Array) -> Array:

@@ -448,8 +448,6 @@ def tabulate(exact: Transfer, size: TableSize, mixing: Mixing) -> Tables:
     Tables
         The tables of the mixtures.
     """
-    if exact.key is None:
-        return _tabulated(exact, size, mixing)
     key = exact.key, size, mixing[0].tobytes(), mixing[1]
     return _TABLES.get(key, lambda: _tabulated(exact, size, mixing))
 

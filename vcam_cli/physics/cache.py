@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from functools import lru_cache, wraps
 from threading import Lock
 from typing import Generic, ParamSpec, Protocol, TypeVar
@@ -61,7 +61,7 @@ class ByteCache(Generic[T]):
 
     def __init__(self, limit: int, strict: bool = False) -> None:
         self._limit, self._least = limit, 0 if strict else 1
-        self._kept: OrderedDict[Hashable, tuple[T, int]] = OrderedDict()
+        self._kept: OrderedDict[object, tuple[T, int]] = OrderedDict()
         self._nbytes = 0
         self._lock = Lock()
 
@@ -69,14 +69,15 @@ class ByteCache(Generic[T]):
         """Pickle as an empty cache of the same limit: results can be computed again."""
         return type(self), (self._limit, not self._least)
 
-    def get(self, key: Hashable, compute: Callable[[], T]) -> T:
+    def get(self, key: object, compute: Callable[[], T]) -> T:
         """Return the result of `compute`, or the one that is kept for the same key.
 
-        Two threads may compute the same result at once; both get an equal one.
+        Two threads may compute the same result at once; both get an equal one. A key without a
+        hash is computed each time.
 
         Parameters
         ----------
-        key : hashable
+        key : object
             What the result depends on.
         compute : callable
             What computes it; called without a lock.
@@ -86,6 +87,10 @@ class ByteCache(Generic[T]):
         T
             The result.
         """
+        try:
+            hash(key)
+        except TypeError:
+            return compute()
         with self._lock:
             if key in self._kept:
                 self._kept.move_to_end(key)

@@ -5,6 +5,8 @@ C(f) = max over places and directions of |sum over wavelengths of w(l) H(f, l)|
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from vcam_cli.arrays import Array
@@ -12,6 +14,7 @@ from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.blurs import Blur, PlaneTransfer, RadialTransfer
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.transfer_functions import Transfer
+from vcam_cli.physics.cache import ByteCache
 from vcam_cli.physics.pupil_harmonics import in_directions
 
 TURNS = 2
@@ -34,6 +37,16 @@ def lens_contrast(path: OpticalPath, frequency: Array) -> Array:
         Contrast (n,) without unit: of blurs that depend on |f| alone, and of the one that changes
         over the field.
     """
+    field = path.field, path.settings.field_zones
+    key = path.transfer.key, path.has_opacity, field, frequency.tobytes()
+    return _CONTRASTS.get(key, partial(_contrast, path, frequency))
+
+
+_CONTRASTS: ByteCache[Array] = ByteCache(1 << 20)
+"""Those of the last lenses: planning, metering and painting ask for the same."""
+
+
+def _contrast(path: OpticalPath, frequency: Array) -> Array:
     transfer, weights = path.transfer, path.judged_weights.sum(axis=0)
     if not path.field_rings:
         mean = (weights / (weights.sum() or 1.0)) @ transfer.otf_radial(frequency)
@@ -43,12 +56,13 @@ def lens_contrast(path: OpticalPath, frequency: Array) -> Array:
     share = light.weights[0, 0] / (light.weights.sum() or 1.0)
     before = share[:, None] * light.otf_radial(frequency)
     found = [
-        _contrast(ring.blur, before, frequency, light.wavelengths) for ring in path.field_rings
+        _in_any_direction(ring.blur, before, frequency, light.wavelengths)
+        for ring in path.field_rings
     ]
     return np.asarray(np.max(found, axis=0))
 
 
-def _contrast(blur: Blur, before: Array, frequency: Array, wavelengths: Array) -> Array:
+def _in_any_direction(blur: Blur, before: Array, frequency: Array, wavelengths: Array) -> Array:
     """Return the largest contrast in any direction behind a blur, from what lies before (J, n)."""
     if radial := of_kind([blur], RadialTransfer):
         return np.asarray(

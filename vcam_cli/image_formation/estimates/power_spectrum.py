@@ -82,13 +82,18 @@ def blocks(axis: Axis) -> Blocks:
     target = np.searchsorted(_starts(axis.terms), start, side="right") - 1
     merged = np.flatnonzero(np.diff(target, prepend=-1))
     row = np.cumsum(np.diff(target, prepend=-1) > 0) - 1
-    both = []
-    for each in (weight[1], weight.max(axis=0)):
-        both.append(np.zeros((len(merged), len(starts))))
-        np.add.at(both[-1], (row, np.concatenate(source)[inside]), each)
+    middle, largest = np.zeros((2, len(merged), len(starts)))
+    place = row, np.concatenate(source)[inside]
+    np.add.at(middle, place, weight[1])
+    np.add.at(largest, place, weight.max(axis=0))
     step = 1 / (2 * axis.length)
-    edges = np.append(starts, count)
-    return Blocks(edges, *both, start[merged] * step, np.maximum.reduceat(stop, merged) * step)
+    return Blocks(
+        np.append(starts, count),
+        middle,
+        largest,
+        start[merged] * step,
+        np.maximum.reduceat(stop, merged) * step,
+    )
 
 
 @lru_cache(1 << 7)
@@ -145,7 +150,8 @@ class PowerSpectrum:
         Array
             Mean squares (C, blocks along y, blocks along x) [(e/s)^2].
         """
-        return self._passed(tables, self.products)[1]
+        middle: Array = self._passed(tables, self.products)[1]
+        return middle
 
     def pixel_power(self, power: Array) -> Array:
         """Return mean squares behind the separable transfer functions.
@@ -361,7 +367,8 @@ def power_spectrum(
         Mean squares by block of terms.
     """
     along_x, along_y = blocks(x), blocks(y)
-    products, largest = [], []
+    products: list[Array] = []
+    largest: list[Array] = []
     every = of or pairs(len(spectrum))
     sums = spectrum.products(along_y.edges, along_x.edges, workers, every)
     for (r, s), of_pair in zip(every, sums, strict=True):
