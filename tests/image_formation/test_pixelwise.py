@@ -97,3 +97,14 @@ def test_a_large_array_is_looked_at_in_every_color(tmp_path):
     rate[1::2, 1::2] += np.where(np.arange(300) % 2, 40.0, -40.0)
     found = changes_by_omission(rate, place, MOSAIC, (VEIL,), (), TIME)
     assert found["stray_light"] == pytest.approx(0.1 * 40 / 2, rel=0.02)  # a quarter of the pixels
+
+
+@pytest.mark.filterwarnings("error")
+def test_places_without_a_pixel_may_hold_anything(place):
+    """A honeycomb's lattice has a place beside every pixel."""
+    mosaic = Mosaic((("R", ".", "B", "."), (".", "G", ".", "G")))
+    filled = np.where(np.add.outer(np.arange(48), np.arange(64)) % 2, np.inf, LIGHT)
+    found = changes_by_omission(filled, place, mosaic, (VEIL, CHARGE), (VEIL, CHARGE), TIME)
+    even = changes_by_omission(LIGHT, place, mosaic, (VEIL, CHARGE), (VEIL, CHARGE), TIME)
+    assert found == even
+    assert found["stray_light"] > 1

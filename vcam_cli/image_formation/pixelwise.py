@@ -100,7 +100,8 @@ def changes_by_omission(
     }
     on_pixels |= {e: _Glare(e.fraction, colors) for e in of_kind(present, VeilingGlare)}
     ordered = [e for e in present if e in on_pixels]
-    photo = rate[rows, columns].astype(np.float64) * time
+    has_pixel = np.any(colors, axis=0)
+    photo = np.where(has_pixel, rate[rows, columns].astype(np.float64), 0.0) * time
     charges, limits = of_kind(present, Charge), of_kind(present, Limit)
     dark = sum(charge.rate() for charge in charges) * time
     light = photo
@@ -119,7 +120,6 @@ def changes_by_omission(
         others[charge.name] = _clip(photo + (dark - charge.rate() * time), limits)
     for limit in limits:
         others[limit.name] = _clip(photo + dark, [e for e in limits if e is not limit])
-    has_pixel = np.any(colors, axis=0)
     pixels = slice(None) if has_pixel.all() else has_pixel
     return {
         name: float(np.sqrt(np.mean((other - raw)[pixels] ** 2))) / time
