@@ -274,8 +274,8 @@ class SpectrumSpec:
         ]
         product = spectra.Spectrum.flat(1.0).multiply(*parts)
         limit = math.inf if self.most is None else self.most * (1 + _SLACK)
-        if _bound(product) > limit and _largest(product) > limit:
-            message = f"reaches {_largest(product):.4g}, more than {self.most:g}"
+        if _bound(product) > limit and _largest_value(product) > limit:
+            message = f"reaches {_largest_value(product):.4g}, more than {self.most:g}"
             raise bad(path, message, "give fractions, not percent")
         return product
 
@@ -369,11 +369,11 @@ def _per_photon(table: spectra.Table, balance: float) -> spectra.Table:
 
 
 def _bound(spectrum: spectra.Spectrum) -> float:
-    """Return what no value exceeds: `_largest` takes ten times as long."""
+    """Return what no value exceeds: `_largest_value` takes ten times as long."""
     return abs(spectrum.scale) * math.prod(float(np.abs(t.value).max()) for t in spectrum.tables)
 
 
-def _largest(spectrum: spectra.Spectrum) -> float:
+def _largest_value(spectrum: spectra.Spectrum) -> float:
     """Return the largest value at any knot where all tables say something."""
     if not spectrum.tables:
         return spectrum.scale

@@ -72,7 +72,7 @@ class Frame:
         places: path -> where mistakes of its value are said to be. Raises BadInput.
         """
         drawn = Source("what is drawn", base.file.parent, lines=False)
-        tree = _with_values(self._own(drawn), self.values, drawn, places or {})
+        tree = _with_values(self._frame_tree(drawn), self.values, drawn, places or {})
         return base.overlay(tree).validate(CHECKS)
 
     def camera_after(self, known: Frame, camera: Camera, base: Document[Camera]) -> Camera:
@@ -87,13 +87,13 @@ class Frame:
             sections.add("scene")
         values = {path: v for path, v in self.values.items() if split(path)[0] in sections}
         try:
-            document = base.overlay(_with_values(self._own(drawn), values, drawn, {}))
+            document = base.overlay(_with_values(self._frame_tree(drawn), values, drawn, {}))
             found = with_sections(camera, document, sections, CHECKS)
         except BadInput:  # said with the whole file
             found = None
         return found or self.camera(base)
 
-    def _own(self, drawn: Source) -> Node:
+    def _frame_tree(self, drawn: Source) -> Node:
         """Return the tree of its seed and scene."""
         tree = tree_at(("seed", "frame"), node_of(self.seed, drawn))
         if self.scene is None:

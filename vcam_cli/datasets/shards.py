@@ -134,7 +134,7 @@ class Packer:
         members = (
             (f"{frame}.{kind}", archive.stored(stored)) for archive, stored, frame, kind in arrays
         )
-        return {name: self._put(name, partial(frame_archive.write_archive, arrays=members))}
+        return {name: self._write_whole(name, partial(frame_archive.write_archive, arrays=members))}
 
     def _write_files(self, shard: Shard, arrays: Iterator[Stored]) -> dict[str, Fingerprint]:
         files = {}
@@ -144,10 +144,10 @@ class Packer:
             file = f"shard_{shard.number:04d}/{frame}_{kind}.tif"
             (self.folder.path / file).parent.mkdir(exist_ok=True)
             put = partial(tiff.write_tiff, samples=whole, description=f"vcam {kind}")
-            files[file] = self._put(file, put)
+            files[file] = self._write_whole(file, put)
         return files
 
-    def _put(self, name: str, write: Any) -> Fingerprint:
+    def _write_whole(self, name: str, write: Any) -> Fingerprint:
         """Write a file, whole, and return its fingerprint; see `pack` for what it raises."""
         path = self.folder.path / name
         with write_whole(path) as temporary:

@@ -174,13 +174,13 @@ class SweepFolder:
         hashes = {}
         for name, data in (files or {}).items():
             hashes[name] = hashlib.sha256(data).hexdigest()
-            self._put(self.file(key, name), data)
+            self._write_unflushed(self.file(key, name), data)
         entry = {"program": PROGRAM, "id": key, "point": content, "hashes": hashes}
         entry = json.loads(to_json(entry))  # numbers as they are read back
         text = to_json(entry | {"check": record_check(entry)})
-        self._put(self.file(key, "json"), text.encode("utf-8", "backslashreplace"))
+        self._write_unflushed(self.file(key, "json"), text.encode("utf-8", "backslashreplace"))
 
-    def _put(self, path: Path, data: bytes) -> None:
+    def _write_unflushed(self, path: Path, data: bytes) -> None:
         atomic.write_bytes(path, data, is_flushed=False)
         self._flush.add(path)
 

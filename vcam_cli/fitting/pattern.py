@@ -105,17 +105,17 @@ def pattern(stack: StackStatistics, good: Array) -> Pattern:
     least = max(low**2 - stack.hidden[1] ** 2, 0.0)
     rest = column + row + parts["column"].above + parts["row"].above
     return Pattern(
-        total=_within(total, least, high**2),
-        pixel=_within(parts["pixel"], least - rest, high**2),
-        column=_within(parts["column"], 0.0, high**2),
-        row=_within(parts["row"], 0.0, high**2),
+        total=_with_bounds_within(total, least, high**2),
+        pixel=_with_bounds_within(parts["pixel"], least - rest, high**2),
+        column=_with_bounds_within(parts["column"], 0.0, high**2),
+        row=_with_bounds_within(parts["row"], 0.0, high**2),
         slow=with_rounding(slow, stack.hidden[0]),
         alien=tuple(int(column) for column in np.flatnonzero(off)),
         largest=float(off[np.argmax(abs(off))]),
     )
 
 
-def _within(found: Estimate, low: float, high: float) -> Estimate:
+def _with_bounds_within(found: Estimate, low: float, high: float) -> Estimate:
     """Return a variance whose bounds reach no farther than to both ends [DN^2]."""
     below, above = max(found.value - max(low, 0.0), 0.0), max(high - found.value, 0.0)
     return replace(found, below=min(found.below, below), above=min(found.above, above))

@@ -110,8 +110,10 @@ def _overlapping_averages(
         painted = scene.chart.crop_to_cells(x_edges, cells).averages(x_edges, cells, mix)
         sums = np.zeros((len(mix), len(cells), len(x_edges)))
         sums[:, 1:, 1:] = painted.cumsum(axis=1, dtype=float).cumsum(axis=2)
-        across = _at(sums, right, 2) - _at(sums, left, 2)
-        inside = _at(across, bottom[rows] - first, 1) - _at(across, top[rows] - first, 1)
+        across = _interpolated_sums(sums, right, 2) - _interpolated_sums(sums, left, 2)
+        inside = _interpolated_sums(across, bottom[rows] - first, 1) - _interpolated_sums(
+            across, top[rows] - first, 1
+        )
         out[:, rows] = inside / ((right - left)[0] * (bottom - top)[0])
     return out
 
@@ -125,7 +127,7 @@ def _grid(center: Array, size: float) -> tuple[Array, Array, Array]:
     return edges, low, low + size / cell
 
 
-def _at(sums: Array, place: Array, axis: int) -> Array:
+def _interpolated_sums(sums: Array, place: Array, axis: int) -> Array:
     """Return running sums between their places, where they are straight."""
     index = np.minimum(place.astype(int), sums.shape[axis] - 2)
     shape = (-1, 1) if axis == 1 else (-1,)

@@ -37,7 +37,10 @@ from vcam_cli.image_formation.transfer_tables import (
     mixtures,
     radial_table,
 )
+from vcam_cli.physics.interpolation import between_entries
 
+CUBIC = 4
+"""Entries that a polynomial between those of a coarse table goes through."""
 PLACES = 97
 """Points of a map along each side of the sensor; between them it is straight."""
 LEFT_ALONG = 1e-3
@@ -309,7 +312,7 @@ def field_along(
     direction = math.atan2(across[1], across[0])
 
     def at_frequencies(table: Array) -> Array:
-        return _between(table[0], frequency / top * (len(coarse) - 1))
+        return between_entries(table[0], frequency / top * (len(coarse) - 1), CUBIC, -1)
 
     mean = np.mean([change[0].real for change in changes], axis=0)
     tables, shares = [at_frequencies(mean)], [np.ones_like(azimuth)]
@@ -473,21 +476,7 @@ def _resampled(table: Array, entries: int) -> Array:
     count = table.shape[-1]
     if count == entries:
         return table
-    return _between(table, np.linspace(0, count - 1, entries))
-
-
-def _between(table: Array, at: Array) -> Array:
-    """Return a table (..., n) at positions between its entries, by cubics through four of them."""
-    count = table.shape[-1]
-    first = np.clip(at.astype(int) - 1, 0, count - 4)
-    t = at - first - 1
-    weights = (
-        -t * (t - 1) * (t - 2) / 6,
-        (t + 1) * (t - 1) * (t - 2) / 2,
-        -t * (t + 1) * (t - 2) / 2,
-        t * (t + 1) * (t - 1) / 6,
-    )
-    return np.asarray(sum(w * table[..., first + k] for k, w in enumerate(weights)))
+    return between_entries(table, np.linspace(0, count - 1, entries), CUBIC, -1)
 
 
 def zone_maps(zones: Sequence[Zone], geometry: Geometry) -> list[Map]:

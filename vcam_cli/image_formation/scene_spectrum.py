@@ -263,10 +263,10 @@ def painted_on(
     paint, brightest = scene.painter(mix), list[Array]()
 
     def fill(rows: slice, out: Array) -> None:
-        def some(part: slice) -> None:
+        def fill_rows(part: slice) -> None:
             paint(slice(rows.start + part.start, rows.start + part.stop), out[:, part])
 
-        paint_by_bands(some, out.shape[1], out.shape[2], workers)
+        paint_by_bands(fill_rows, out.shape[1], out.shape[2], workers)
         brightest.append(np.maximum(out.max(axis=(1, 2)), -out.min(axis=(1, 2))))
 
     planes = _in_bands(device, (len(mix), *scene.shape), scene.dtype, fill)
@@ -291,12 +291,12 @@ def copied_to(
     """
 
     def fill(rows: slice, out: Array) -> None:
-        def some(part: slice) -> None:
+        def fill_rows(part: slice) -> None:
             for plane, own in enumerate(out):
                 index = slice(rows.start + part.start, rows.start + part.stop)
                 own[part] = spectrum.rows(plane, index, terms[1])
 
-        each(some, pieces(out.shape[1], rows_at_once(terms[1])), workers)
+        each(fill_rows, pieces(out.shape[1], rows_at_once(terms[1])), workers)
 
     return DeviceSpectrum(_in_bands(device, (len(spectrum), *terms), spectrum.dtype, fill), device)
 

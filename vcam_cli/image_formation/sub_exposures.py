@@ -281,14 +281,14 @@ def _error_between(plane: Array) -> float:
         known = ndimage.spline_filter1d(
             some[:, 0:odd:2].astype(float), order=SPLINES, axis=1, mode="mirror"
         )
-        found = _between(known, np.arange(odd // 2) + 0.5)
+        found = _spline_values(known, np.arange(odd // 2) + 0.5)
         inner = slice(SPLINES, -SPLINES if odd // 2 > 2 * SPLINES else None)
         missed = (found - some[:, 1:odd:2])[:, inner]
         squares += float(np.square(missed, dtype=np.float64).mean()) if missed.size else 0.0
     return math.sqrt(squares)
 
 
-def _between(coefficients: Array, at: Array) -> Array:
+def _spline_values(coefficients: Array, at: Array) -> Array:
     """Return splines along the second axis, of coefficients (m, n), at places (p,): (m, p)."""
     from scipy import ndimage
 

@@ -639,13 +639,13 @@ def mixtures(
         return every, 0.0
     table = np.concatenate([*_samples(exact, size.top), *more()], axis=1)
     peak, mix, error = np.abs(exact.level).max() or 1.0, every[:0], 0.0
-    for part in _apart(exact.weights) if size.rank is None else [np.arange(components)]:
+    for part in _separate_groups(exact.weights) if size.rank is None else [np.arange(components)]:
         own, lost = _fewest(table[part], size.tolerance * peak, most)
         mix, error = np.concatenate([mix, own @ every[part]]), max(error, lost / peak)
     return mix, error
 
 
-def _apart(weights: Array) -> list[Array]:
+def _separate_groups(weights: Array) -> list[Array]:
     """Return the components (n,) of each group that has no color in common with others.
 
     Those that no color sees are in none.

@@ -101,13 +101,13 @@ def beam_edges(view: View, angles: Array, wavelength: float, count: int, vignett
 
     def fullness(u: Array, v: Array) -> Array:
         found = view.trace(angles, waves, u, v)
-        return _most(found, stop, vignetted)
+        return _largest_fullness(found, stop, vignetted)
 
     chief = view.chief(angles, waves)[..., None]
     return Pupil(*_edges(fullness, chief, view.lens.pupil_diameter / 2, count))
 
 
-def _most(found: Trace, stop: float, vignetted: bool) -> Array:
+def _largest_fullness(found: Trace, stop: float, vignetted: bool) -> Array:
     """Return how full the fullest aperture is, by radius; infinite where a ray fails."""
     most = np.hypot(found.stop_x, found.stop_y) / stop
     if vignetted:
@@ -143,7 +143,7 @@ class _Backwards:
         rays = Rays(at, zero, zero - self._gap, x, y, n, zero, real)
         rays = rays.after(self._gap / n, 1.0)
         found = trace(self._lens.surfaces, self._indices, rays, self._lens.stop)
-        return _most(found, self._stop, self._vignetted)
+        return _largest_fullness(found, self._stop, self._vignetted)
 
 
 def _edges(fullness: Fullness, chief: Array, scale: float, count: int) -> tuple[Array, Array]:

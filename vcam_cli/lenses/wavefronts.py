@@ -16,7 +16,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.lenses.fields import View
 from vcam_cli.lenses.pupils import beam_edges
 from vcam_cli.physics import shaped_pupil
-from vcam_cli.physics.pupil_harmonics import lagrange
+from vcam_cli.physics.interpolation import lagrange
 from vcam_cli.physics.shaped_pupil import Mask, OtfGrid
 
 ORDER = 12

@@ -22,6 +22,7 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.physics import zernike
+from vcam_cli.physics.interpolation import lagrange
 from vcam_cli.physics.zernike import Floats, Terms
 
 MOST_SLOPE = 8.0
@@ -215,12 +216,3 @@ def _chebyshev(values: Array) -> Array:
     matrix[0] /= 2
     coefficients: Array = np.einsum("dh,nhm->ndm", matrix, values)
     return coefficients
-
-
-def lagrange(nodes: Floats, at: float | Floats) -> Floats:
-    """Return the weights of values at nodes (n,) in the polynomial through them (..., n)."""
-    others = np.subtract.outer(at, nodes)[..., None]  # (..., j, 1) beside nodes (i)
-    apart = np.subtract.outer(nodes, nodes).T
-    own = np.eye(len(nodes), dtype=bool)
-    weights: Floats = np.where(own, 1.0, others / np.where(own, 1.0, apart)).prod(axis=-2)
-    return weights

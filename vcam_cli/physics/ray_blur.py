@@ -184,7 +184,7 @@ def _by_direction(
     rest, tilt = zernike.split_tilt(terms)
     if zernike.is_symmetric(rest):
         mean = otf_symmetric(frequency, working_f_number, rest)[:, None]
-        return lambda angles: mean * _moved(frequency, angles, working_f_number, tilt)
+        return lambda angles: mean * _tilt_factor(frequency, angles, working_f_number, tilt)
     radius = blur_radius(rest, working_f_number)
     within = frequency <= MAX_CYCLES / radius
     highest, step = float(frequency[within].max(initial=0.0)), float(frequency[1])
@@ -196,7 +196,7 @@ def _by_direction(
     spread = np.sinc(frequency[within] / (cells * step)) ** 4
 
     def values(angles: Floats) -> Array:
-        found = _moved(frequency, angles, working_f_number, tilt) * within[:, None]
+        found = _tilt_factor(frequency, angles, working_f_number, tilt) * within[:, None]
         for k, angle in enumerate(angles.tolist()):
             place = (math.cos(angle) * right + math.sin(angle) * down) * (cells * step)
             index = np.floor(place).astype(int)
@@ -209,7 +209,7 @@ def _by_direction(
     return values
 
 
-def _moved(
+def _tilt_factor(
     frequency: Floats, angles: Floats, working_f_number: float, tilt: tuple[float, float]
 ) -> NDArray[np.complex128]:
     """Return the factor (n, d) of an image that tilt moves."""

@@ -76,13 +76,13 @@ def _differences(left: Array, right: Array, shift: int) -> Array:
     An odd shift is taken one pixel more on one side, and averaged with the other way.
     """
     low, high = shift // 2, -(-shift // 2)
-    one = _moved(left, high) - _moved(right, -low)
+    one = _shifted(left, high) - _shifted(right, -low)
     if low == high:
         return one
-    return (one + _moved(left, low) - _moved(right, -high)) / 2
+    return (one + _shifted(left, low) - _shifted(right, -high)) / 2
 
 
-def _moved(picture: Array, by: int) -> Array:
+def _shifted(picture: Array, by: int) -> Array:
     """Return picture(x + by) with its border going on."""
     columns = np.arange(picture.shape[1]) + by
     return picture[:, np.clip(columns, 0, picture.shape[1] - 1)]

@@ -217,7 +217,9 @@ def rectangle_bounds(
         The bounds, none for blurs that change over the field.
     """
     light = np.tensordot(losses[0].level, values, axes=(0, 0)).max(axis=0)
-    sides = [np.diff(_within(e, size)) for e, size in zip((y, x), _size(geometry), strict=True)]
+    sides = [
+        np.diff(_clipped_edges(e, size)) for e, size in zip((y, x), _size(geometry), strict=True)
+    ]
     brightest, half = _widest_bright(light, *sides)
     full = _least_signal(brightest, half, 2, losses, geometry, ceiling)
     changes = []
@@ -272,7 +274,7 @@ def _size(geometry: Geometry) -> tuple[float, float]:
     return geometry.sensor_height, geometry.sensor_width
 
 
-def _within(edges: Array, length: float) -> Array:
+def _clipped_edges(edges: Array, length: float) -> Array:
     return np.clip(edges, -length / 2, length / 2)
 
 

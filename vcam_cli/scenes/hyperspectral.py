@@ -170,7 +170,7 @@ class CubeScene(ImageScene):
         each(paint, pieces(height, ROWS), workers)
         return out
 
-    def _largest(self, samples: Array) -> float:
+    def _largest_sample(self, samples: Array) -> float:
         """Return the largest sample of a band over that of white there."""
         blocks = (samples[top : top + ROWS] for top in range(0, len(samples), ROWS))
         most = np.max([block.max(axis=(0, 1)) for block in blocks], axis=0) / self.units

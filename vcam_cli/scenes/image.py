@@ -162,14 +162,14 @@ class ImageScene(SampledScene):
     @cached_property
     def brightest(self) -> float:
         """Largest sample, in units of white."""
-        return self._largest(self.picture)
+        return self._largest_sample(self.picture)
 
     @cached_property
     def brightest_cut(self) -> float:
         """Largest sample beyond array and margin, in units of white; 0 if nothing is cut."""
-        return max(map(self._largest, self.cut), default=0.0)
+        return max(map(self._largest_sample, self.cut), default=0.0)
 
-    def _largest(self, samples: Array) -> float:
+    def _largest_sample(self, samples: Array) -> float:
         return max(float(samples.max(initial=0.0)), 0.0)
 
     def change_bounds(

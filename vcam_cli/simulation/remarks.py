@@ -58,7 +58,7 @@ class Notes(Sequence[str]):
 
     @cached_property
     @own_float_errors
-    def _found(self) -> tuple[str, ...]:
+    def _all_remarks(self) -> tuple[str, ...]:
         return self._earlier + remarks(self._ready)
 
     @overload
@@ -67,15 +67,15 @@ class Notes(Sequence[str]):
     def __getitem__(self, index: slice) -> tuple[str, ...]: ...
     def __getitem__(self, index: int | slice) -> str | tuple[str, ...]:
         """Return one note, or several."""
-        return self._found[index]
+        return self._all_remarks[index]
 
     def __iter__(self) -> Iterator[str]:
         """Return an iterator over the notes."""
-        return iter(self._found)
+        return iter(self._all_remarks)
 
     def __len__(self) -> int:
         """Return the number of notes."""
-        return len(self._found)
+        return len(self._all_remarks)
 
 
 def remarks(ready: Prepared) -> tuple[str, ...]:

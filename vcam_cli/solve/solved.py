@@ -290,7 +290,7 @@ class Solved:
         before = camera.before_scene_of(self.camera)
         return _solve(before, self.response, self.per_exposure)
 
-    def _with(self, **changes: Any) -> Self:
+    def _with_sections(self, **changes: Any) -> Self:
         """Return the camera with some sections changed that nothing solved follows from."""
         return replace(self, camera=self.camera.model_copy(update=changes))
 
@@ -326,7 +326,7 @@ class Solved:
         Self
             Camera with these seeds, and the same readout chain: nothing in it is drawn.
         """
-        found = self._with(seed=seed)
+        found = self._with_sections(seed=seed)
         # Of a camera with two readouts, solving it anew takes a quarter of the time of `verify`.
         found.__dict__["chain"] = self.chain
         return found
@@ -347,7 +347,7 @@ class Solved:
             Camera with this exposure.
         """
         update = {"captures": times, "estimator": estimator}
-        return self._with(exposure=self.exposure.model_copy(update=update))
+        return self._with_sections(exposure=self.exposure.model_copy(update=update))
 
     def standing_still(self) -> Solved:
         """Return the camera as it meters and focuses: what moves stands where its file says."""

@@ -73,7 +73,7 @@ def find_joint_optimum(
     errors = _interpolation_errors(fit, (scales, y, best))
     value = max(float(fitted[0]), float(y.mean(axis=0).min()))
     return tuple(
-        _along(
+        _parameter_optimum(
             axis,
             (scale, best[i], float(places[0, i]), found[:, i], errors[i], fit.follows),
             sign * value,
@@ -105,7 +105,7 @@ def _interpolation_errors(fit: _Fit, known: tuple[Sequence[Array], Array, Sequen
     )
 
 
-def _along(
+def _parameter_optimum(
     axis: Array,
     known: tuple[Array, int, float, Array, float, bool],
     value: float,

@@ -247,7 +247,7 @@ def _points(
             here,
             content=_content(camera, forms.of(camera), model, device),
             light=hash_text(light_key(camera)),
-            effects=_same(tuple(wanted_effects(camera))),
+            effects=_shared_names(tuple(wanted_effects(camera))),
             inputs=files[camera.files],
         )
         for i in range(model.seeds):
@@ -257,7 +257,7 @@ def _points(
 
 
 @cache
-def _same(names: tuple[str, ...]) -> tuple[str, ...]:
+def _shared_names(names: tuple[str, ...]) -> tuple[str, ...]:
     """Return one tuple for all that are equal: a sweep has millions of them."""
     return names
 

@@ -153,7 +153,7 @@ def _read(given: Given) -> Prescription:
     except OSError:
         stamp = 0, 0
     try:
-        lens = _kept(str(file), stamp, glasses)
+        lens = _read_lens(str(file), stamp, glasses)
     except BadInput as error:
         # the problem lies in the lens's file, whose line the message has
         raise BadInput(
@@ -167,7 +167,7 @@ def _read(given: Given) -> Prescription:
 
 
 @lru_cache(maxsize=16)
-def _kept(
+def _read_lens(
     file: str, stamp: tuple[int, int], glasses: tuple[tuple[str, ModelGlass], ...]
 ) -> Prescription:
     """Return the lens of a file in one state of it."""

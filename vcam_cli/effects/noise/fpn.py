@@ -78,10 +78,10 @@ class FixedPattern(NoiseSource):
 
     def __post_init__(self) -> None:
         # Where all pixels are defective they do not differ: the plan would see no noise in it.
-        object.__setattr__(self, "removable", not (self.hot or self._lost))
+        object.__setattr__(self, "removable", not (self.hot or self._dead_fraction))
 
     @property
-    def _lost(self) -> float:
+    def _dead_fraction(self) -> float:
         """Fraction of the pixels that collect nothing."""
         return 1 - (1 - self.dead) * (1 - self.bad_columns) * (1 - self.bad_rows)
 
@@ -183,7 +183,7 @@ class FixedPattern(NoiseSource):
         """Return the variance that it adds to a pixel [electrons squared]."""
         offsets = self.offset_pixel**2 + self.offset_column**2
         gains = (self.gain_pixel**2 + self.gain_column**2) * mean**2
-        lost = self._lost
+        lost = self._dead_fraction
         if self.hot_current:
             return self._leaking_variance(mean, dark, offsets, gains)
         working = 1 - self.hot - lost
@@ -197,7 +197,7 @@ class FixedPattern(NoiseSource):
 
     def _leaking_variance(self, mean: float, dark: float, offsets: float, gains: float) -> float:
         """Variance where hot pixels have a dark current of their own [electrons squared]."""
-        working, leak = 1 - self._lost, self.hot_current * dark
+        working, leak = 1 - self._dead_fraction, self.hot_current * dark
         within = offsets + (gains + self._dark_variance(dark)) * working
         center = working * mean + self.hot * leak
         # The mean square of an exponential distribution is twice its squared mean.

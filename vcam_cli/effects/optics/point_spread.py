@@ -139,7 +139,7 @@ class PointSpread(AberrationBlur, PlaneTransfer):
             some = pieces(len(frequency), AT_ONCE)
             return np.concatenate([self._channels_along(frequency[s], across) for s in some], 1)
 
-        transfer = self._at(self._transfer_cache.get(key, compute), wavelength)
+        transfer = self._channel_transfer(self._transfer_cache.get(key, compute), wavelength)
         return transfer * (np.abs(frequency) <= self.cutoff_along(across, wavelength))
 
     def _channels_along(self, frequency: Array, across: tuple[float, float]) -> Array:
@@ -153,11 +153,11 @@ class PointSpread(AberrationBlur, PlaneTransfer):
     def smooth_otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
         """Return the Fourier sums of the samples, periodic in fx and fy: complex (m, n)."""
         key = (fx.tobytes(), fy.tobytes())
-        return self._at(
+        return self._channel_transfer(
             self._transfer_cache.get(key, lambda: self._channel_transfers(fx, fy)), wavelength
         )
 
-    def _at(self, channels: Array, wavelength: float) -> Array:
+    def _channel_transfer(self, channels: Array, wavelength: float) -> Array:
         """Return the transfer at a wavelength between those of the channels (channels, ...)."""
         if len(self.wavelengths) < 2:
             copied: Array = channels[0].copy()

@@ -68,13 +68,13 @@ class ShapedBlur(UniformBlur, PlaneTransfer):
 
     def otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
         """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: complex (m, n)."""
-        return self._at(fx[None, :], fy[:, None], wavelength)
+        return self._otf_at(fx[None, :], fy[:, None], wavelength)
 
     def otf_along(self, frequency: Array, across: tuple[float, float], wavelength: float) -> Array:
         """Return the transfer (n,) of waves in one direction."""
-        return self._at(across[0] * frequency, across[1] * frequency, wavelength)
+        return self._otf_at(across[0] * frequency, across[1] * frequency, wavelength)
 
-    def _at(self, fx: Array, fy: Array, wavelength: float) -> Array:
+    def _otf_at(self, fx: Array, fy: Array, wavelength: float) -> Array:
         lag = 2 * wavelength * self.lens.working_f_number
         key = wavelength, self.terms, self.focus
         grid = self.grids.get(key, lambda: self._grid(wavelength))

@@ -32,7 +32,8 @@ from vcam_cli.parallel import product
 from vcam_cli.physics import shaped_pupil
 from vcam_cli.physics.aberration import MAX_SLOPE
 from vcam_cli.physics.cache import ByteCache
-from vcam_cli.physics.pupil_harmonics import direction_harmonics, lagrange
+from vcam_cli.physics.interpolation import between_entries, lagrange
+from vcam_cli.physics.pupil_harmonics import direction_harmonics
 from vcam_cli.physics.shaped_pupil import OtfGrid
 
 FEWEST_PLACES, MOST_PLACES = 5, 9
@@ -141,11 +142,11 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
 
     def otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
         """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: complex (m, n)."""
-        return self._turned(fx[None, :], fy[:, None], wavelength)
+        return self._turned_otf(fx[None, :], fy[:, None], wavelength)
 
     def otf_along(self, frequency: Array, across: tuple[float, float], wavelength: float) -> Array:
         """Return the transfer (n,) of waves in one direction."""
-        return self._turned(across[0] * frequency, across[1] * frequency, wavelength)
+        return self._turned_otf(across[0] * frequency, across[1] * frequency, wavelength)
 
     def harmonics(self, frequency: Array, wavelengths: Array) -> Array:
         """Return the transfer (J, n, m) as harmonics of the direction, for the angle 0."""
@@ -166,12 +167,12 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
         """
         at = np.minimum(frequency, self._end)
         if self.diffracts:
-            return _between(self._table(self._end), at / self._step)
+            return between_entries(self._table(self._end), at / self._step, STENCIL, 1)
         inside = int(np.count_nonzero(frequency < self._end))
         if inside < self._entries(float(at.max())) // 2:
             few = self._kept_harmonics(frequency[:inside]).astype(np.complex128)
             return np.pad(few, ((0, 0), (0, len(frequency) - inside), (0, 0)))
-        return _between(self._table(float(at.max())), at / self._step)
+        return between_entries(self._table(float(at.max())), at / self._step, STENCIL, 1)
 
     @property
     def _step(self) -> float:
@@ -222,7 +223,7 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
                 fx, fy = (np.multiply.outer(frequency, along(half)) for along in (np.cos, np.sin))
                 found = np.array([self._at_node(fx, fy, node) for node in nodes])
             else:
-                found = np.array([self._along(frequency, half, node) for node in nodes])
+                found = np.array([self._harmonic_rays(frequency, half, node) for node in nodes])
             first = 1 if angles[0] == 0 else 0
             mirrored = found[..., first : first + len(angles) - len(half)]
             return np.concatenate([found, mirrored[..., ::-1].conj()], axis=-1)
@@ -233,14 +234,14 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         # A wavefront even in y: a quarter of all frequencies has the losses of the others.
         f = np.linspace(0, 0.999 * self.cutoff(GREEN), 33)
-        loss = np.abs(1 - self._still(f[None, :], f[:, None], GREEN)).max()
+        loss = np.abs(1 - self._upright_otf(f[None, :], f[:, None], GREEN)).max()
         return float(loss) * float(signal.full_signal)
 
-    def _turned(self, fx: Array, fy: Array, wavelength: float) -> Array:
+    def _turned_otf(self, fx: Array, fy: Array, wavelength: float) -> Array:
         cos, sin = math.cos(self.angle), math.sin(self.angle)
-        return self._still(cos * fx + sin * fy, cos * fy - sin * fx, wavelength)
+        return self._upright_otf(cos * fx + sin * fy, cos * fy - sin * fx, wavelength)
 
-    def _still(self, fx: Array, fy: Array, wavelength: float) -> Array:
+    def _upright_otf(self, fx: Array, fy: Array, wavelength: float) -> Array:
         """Return the transfer at frequencies that broadcast, for the angle 0.
 
         At one frequency it is smooth in the wavelength: rays land where they do.
@@ -319,7 +320,7 @@ class PlaceBlur(AberrationBlur, PlaneTransfer):
             out[some] = np.exp(-2j * np.pi * turns).mean(axis=1)
         return out.reshape(fx.shape)
 
-    def _along(self, frequency: Array, angles: Array, node: int) -> Array:
+    def _harmonic_rays(self, frequency: Array, angles: Array, node: int) -> Array:
         """Return what `_at_node` does by rays at frequencies (n,) in directions (d,): (n, d).
 
         Frequencies lie in even steps. The wave of the one in place a s + b is the product of those
@@ -473,10 +474,10 @@ class TracedBlur(AberrationBlur, FieldTransfer):
 
     def _places(self, count: int) -> tuple[PlaceBlur, ...]:
         """Return the blur at `count` places, traced once for each count."""
-        if count not in self._kept:
+        if count not in self._kept_blurs:
             at = (1 - np.cos(np.pi * np.arange(count) / (count - 1))) / 2
-            self._kept[count] = self.at_heights(self.half_diagonal * at)
-        return self._kept[count]
+            self._kept_blurs[count] = self.at_heights(self.half_diagonal * at)
+        return self._kept_blurs[count]
 
     def at_heights(self, heights: Array) -> tuple[PlaceBlur, ...]:
         """Return the blur at image heights.
@@ -504,23 +505,9 @@ class TracedBlur(AberrationBlur, FieldTransfer):
         )
 
     @cached_property
-    def _kept(self) -> dict[int, tuple[PlaceBlur, ...]]:
+    def _kept_blurs(self) -> dict[int, tuple[PlaceBlur, ...]]:
         return {}
 
 
 _HARMONICS: ByteCache[Array] = ByteCache(HARMONICS, strict=True)
 """Harmonics at the nodes of a place, over evenly spaced frequencies from 0."""
-
-
-def _between(table: Array, position: Array) -> Array:
-    """Return a table (w, entries, m) at positions (n,) between its entries, by polynomials."""
-    first = np.clip(position.astype(int) - STENCIL // 2 + 1, 0, table.shape[1] - STENCIL)
-    at = position - first
-    total = np.zeros((len(table), len(position), table.shape[2]), np.complex128)
-    for own in range(STENCIL):
-        weight = np.ones(len(position))
-        for other in range(STENCIL):
-            if other != own:
-                weight *= (at - other) / (own - other)
-        total += weight[:, None] * table[:, first + own]
-    return total

@@ -109,15 +109,15 @@ class SubExposedMotion(ImageMotion):
     @property
     def travel(self) -> float:
         """How far from its place light comes to lie [m]."""
-        return float(np.hypot(*self._moved()).max())
+        return float(np.hypot(*self._displacements()).max())
 
     @property
     def longest_path(self) -> float:
         """Largest distance between two instants of one pixel, about [m]."""
-        x, y = self._moved()
+        x, y = self._displacements()
         return float(np.hypot(np.ptp(x, axis=0), np.ptp(y, axis=0)).max())
 
-    def _moved(self) -> tuple[Array, Array]:
+    def _displacements(self) -> tuple[Array, Array]:
         """Return by how much the image is displaced at some instants and places (n, places) [m]."""
         x, y = (np.linspace(-0.5, 0.5, PLACES) * size for size in (self.width, self.height))
         count, recorded = INSTANTS, self.exposed.trajectory.recorded

@@ -168,7 +168,7 @@ class CellError:
         f = np.linspace(0, self.top, 8 * FREQUENCIES + 1)
         return f, np.square(lens_contrast(self.path, f))
 
-    def _passed(self, fx: Array, fy: Array) -> Array:
+    def _squared_transfer(self, fx: Array, fy: Array) -> Array:
         """Return the squared transfer at frequencies of one shape [cycles/m]."""
         f, squares = self._table
         passed = np.interp(np.hypot(fx, fy), f, squares, right=0.0)
@@ -185,7 +185,11 @@ class CellError:
             Rms error [e/s].
         """
         f, _ = self._table
-        across = 2 * self._passed(f, np.zeros_like(f)) / np.square(2 * np.pi * (f + 1e-9 * f[-1]))
+        across = (
+            2
+            * self._squared_transfer(f, np.zeros_like(f))
+            / np.square(2 * np.pi * (f + 1e-9 * f[-1]))
+        )
         steps = (across[1:] + across[:-1]) / 2 * np.diff(f)
         beyond = (self.energy.aligned + self.energy.oblique) * steps[::-1].cumsum()[::-1]
         return float(f[np.count_nonzero(beyond > error**2)])
@@ -220,7 +224,7 @@ class CellError:
         f, _ = self._table
         turns = f * side
         parts = (np.square(_folded(turns, k) * side / (2 * np.pi * (turns + k))) for k in FOLDS)
-        folded = np.where(turns < 0.5, sum(parts, np.zeros_like(f)), np.square(self._lost))
+        folded = np.where(turns < 0.5, sum(parts, np.zeros_like(f)), np.square(self._unit_edge))
         return max(2 * float(np.trapezoid(passed * folded, f)) for passed in self._passed_across)
 
     def _of_alike(self, side: float) -> float:
@@ -233,7 +237,7 @@ class CellError:
         f, _ = self._table
         turns = np.clip(f * side, 1e-9, 0.5)
         folded = turns * side / (2 * np.pi) * (np.square(np.pi / np.sin(np.pi * turns)) - turns**-2)
-        error = np.where(turns < 0.5, folded, self._lost)
+        error = np.where(turns < 0.5, folded, self._unit_edge)
         g, found = self.path.geometry, []
         for passed, pitch in zip(self._passed_across, (g.pitch_x, g.pitch_y), strict=True):
             own = np.linspace(-0.5, 0.5, len(f)) / pitch
@@ -247,10 +251,12 @@ class CellError:
     def _passed_across(self) -> tuple[Array, Array]:
         """The squared transfer (n,) of waves along x, and along y."""
         f, _ = self._table
-        return self._passed(f, np.zeros_like(f)), self._passed(np.zeros_like(f), f)
+        return self._squared_transfer(f, np.zeros_like(f)), self._squared_transfer(
+            np.zeros_like(f), f
+        )
 
     @cached_property
-    def _lost(self) -> Array:
+    def _unit_edge(self) -> Array:
         """What an edge of energy 1 has at the frequencies (n,) [m]."""
         f, _ = self._table
         return np.asarray(1 / (2 * np.pi * np.maximum(f, 1e-9 * self.top)))
@@ -278,7 +284,7 @@ class CellError:
         """
         f = (np.arange(FREQUENCIES) + 0.5) * (self.top / FREQUENCIES)
         fx, fy = np.meshgrid(f, f)
-        return f, self._passed(fx, fy), 2 / (2 * np.pi * np.hypot(fx, fy)) ** 3
+        return f, self._squared_transfer(fx, fy), 2 / (2 * np.pi * np.hypot(fx, fy)) ** 3
 
 
 FOLDS = (-2, -1, 1, 2)

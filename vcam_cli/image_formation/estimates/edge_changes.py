@@ -163,7 +163,7 @@ def _groups(path: OpticalPath, scene: ChartScene, spread: float) -> Iterator[Edg
         yield EdgeGroup(
             (1.0, 0.0) if axis == 0 else (0.0, 1.0),
             np.diff(values[:, some], axis=2),
-            *_near(at, edges[1:-1], _reach(path, spread)),
+            *_nearby_pixels(at, edges[1:-1], _reach(path, spread)),
             counts[some],
         )
 
@@ -172,7 +172,7 @@ def _reach(path: OpticalPath, spread: float) -> float:
     return AROUND * max(path.geometry.pitch_x, path.geometry.pitch_y, spread)
 
 
-def _near(at: Array, places: Array, reach: float) -> tuple[Array, Array]:
+def _nearby_pixels(at: Array, places: Array, reach: float) -> tuple[Array, Array]:
     """Return the distances (n, m) of pixels at places from edges, and their numbers.
 
     Of pixels beyond the array the distance is inf.
@@ -202,12 +202,12 @@ def _along_profile(
     over, beside = across if steep else across[::-1]
     reach = _reach(path, spread) / abs(over)
     if abs(beside) * np.ptp(lines) < SAME * path.geometry.pitch_x:
-        distances, index = _near(at, places / over, reach)
+        distances, index = _nearby_pixels(at, places / over, reach)
         count = np.full(1, len(lines))
         return EdgeGroup(across, heights, over * distances, index, count, steep)
     # Where an edge crosses a line, and from there along the line.
     crossed = (places[:, None] - beside * lines) / over
-    distances, index = _near(at, crossed.ravel(), reach)
+    distances, index = _nearby_pixels(at, crossed.ravel(), reach)
     shape = len(places), -1
     number = index + len(at) * np.tile(np.arange(len(lines)), len(places))[:, None]
     return EdgeGroup(
@@ -226,11 +226,11 @@ def _group_squares(path: OpticalPath, group: EdgeGroup, blur: Blur | FieldTransf
     reach = float(np.abs(group.distances[np.isfinite(group.distances)]).max(initial=0.0))
     if not reach:
         return np.zeros(weights.shape[1])
-    top = min(END / min(g.pitch_x, g.pitch_y), _passed(path, blur))  # beyond, H is 0
+    top = min(END / min(g.pitch_x, g.pitch_y), _cutoff(path, blur))  # beyond, H is 0
     count = math.ceil(4 * reach * top) + 1
     f = (np.arange(count) + 0.5) * (top / count)
     frequency = np.append(f, top)
-    found = _added(path, blur, frequency, group.across)
+    found = _changed_waves(path, blur, frequency, group.across)
     if found is None:
         return None
     added, maps = found
@@ -238,7 +238,7 @@ def _group_squares(path: OpticalPath, group: EdgeGroup, blur: Blur | FieldTransf
     mix = weights[0] if len(weights) == 1 and maps is None else np.eye(added.shape[1])
     if len(weights) == 1:
         weights = np.eye(weights.shape[1])[None]
-    taken = _taken(path, group, f, mix @ added)
+    taken = _edge_losses(path, group, f, mix @ added)
     if maps is None:
         seen = taken[:, :, 0].transpose(0, 2, 1)
     else:
@@ -264,7 +264,7 @@ def _group_squares(path: OpticalPath, group: EdgeGroup, blur: Blur | FieldTransf
     return squares
 
 
-def _added(
+def _changed_waves(
     path: OpticalPath, blur: Blur | FieldTransfer, frequency: Array, across: tuple[float, float]
 ) -> tuple[Array, Map | None] | None:
     """Return what a blur adds to waves in one direction (M, J, n), and how much there is of each.
@@ -280,7 +280,7 @@ def _added(
     return None if otf is None else (otf[None] - 1, None)
 
 
-def _passed(path: OpticalPath, blur: Blur | FieldTransfer) -> float:
+def _cutoff(path: OpticalPath, blur: Blur | FieldTransfer) -> float:
     """Return the frequency from which a blur passes nothing [cycles/m]."""
     if blur is path.field:
         shortest = float(path.transfer.wavelengths[0])
@@ -288,7 +288,7 @@ def _passed(path: OpticalPath, blur: Blur | FieldTransfer) -> float:
     return path.transfer.with_effects((blur,)).cutoff
 
 
-def _taken(path: OpticalPath, group: EdgeGroup, f: Array, added: Array) -> Array:
+def _edge_losses(path: OpticalPath, group: EdgeGroup, f: Array, added: Array) -> Array:
     """Return what is taken from edges of height 1 at pixels beside them (n, m, M, J).
 
     `added` is H - 1 (M, J, k + 1) at the frequencies f (k,) and at their end.

@@ -150,7 +150,7 @@ class PowerSpectrum:
         Array
             Mean squares (C, blocks along y, blocks along x) [(e/s)^2].
         """
-        middle: Array = self._passed(tables, self.products)[1]
+        middle: Array = self._power_at_places(tables, self.products)[1]
         return middle
 
     def pixel_power(self, power: Array) -> Array:
@@ -184,9 +184,9 @@ class PowerSpectrum:
         Array
             Mean squares (C, blocks along y, blocks along x) [(e/s)^2].
         """
-        return self.pixel_power(self._passed(tables, self.largest_products).max(axis=0))
+        return self.pixel_power(self._power_at_places(tables, self.largest_products).max(axis=0))
 
-    def _passed(self, tables: Tables, products: Array) -> Array:
+    def _power_at_places(self, tables: Tables, products: Array) -> Array:
         """Return what a lens passes at the `places` of the blocks (3, C, along y, along x)."""
         power = np.zeros((3, tables.colors, len(self.y.low), len(self.x.low)))
         for parity in tables.parities:
@@ -240,8 +240,8 @@ class PowerSpectrum:
         """Return the largest squares of separable transfer functions in the blocks."""
         along_x, along_y = np.ones(len(self.x.low)), np.ones(len(self.y.low))
         for effect in effects:
-            along_x *= _largest(effect.along_x, self.x)
-            along_y *= _largest(effect.along_y, self.y)
+            along_x *= _largest_squares(effect.along_x, self.x)
+            along_y *= _largest_squares(effect.along_y, self.y)
         return np.outer(along_y, along_x)
 
     def needed_frequency(self, power: Array, budget: float, pitch: tuple[float, float]) -> float:
@@ -333,7 +333,7 @@ def _shells(x: Blocks, y: Blocks, pitch: tuple[float, float]) -> tuple[Array, Ar
     return frequency, bins, (int(zones[0].max()) + 1) * count
 
 
-def _largest(transfer: Callable[[Array], Array], blocks: Blocks) -> Array:
+def _largest_squares(transfer: Callable[[Array], Array], blocks: Blocks) -> Array:
     """Return the largest square of a transfer function along one axis in every block."""
     return np.asarray(np.square([transfer(f) for f in blocks.places]).max(axis=0))
 

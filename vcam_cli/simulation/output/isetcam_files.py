@@ -153,7 +153,10 @@ def _sensor(frame: Frame) -> dict[str, Any]:
         "name": frame.solved.name,
         "rows": g.rows,
         "cols": g.columns,
-        "data": {"volts": _last(volts), "dv": _last(np.asarray(frame.dn, np.float32))},
+        "data": {
+            "volts": _colors_last(volts),
+            "dv": _colors_last(np.asarray(frame.dn, np.float32)),
+        },
         "color": {"filterNames": names},
         "cfa": {"pattern": np.array(order, np.float64)},
         "integrationTime": frame.exposure_time,
@@ -173,7 +176,7 @@ def _sensor(frame: Frame) -> dict[str, Any]:
     }
 
 
-def _last(values: Array) -> Array:
+def _colors_last(values: Array) -> Array:
     """Return colors behind rows and columns."""
     return np.moveaxis(values, 0, -1) if values.ndim == 3 else values
 
