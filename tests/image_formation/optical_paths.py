@@ -112,7 +112,7 @@ def of_camera(made: Camera, picture: Any = None) -> tuple[OpticalPath, Scene]:
     g, knobs, effects = solved.geometry, solved.settings, solved.effects.mean_signal
     band, colors = made.scene.wavelengths, solved.layout.mosaic
     margin = bandwidth.margin(g, effects, (band.start, band.stop), knobs)
-    scene = build(made.scene, photon_rate.view(g, knobs, margin), picture)
+    scene = build(made.scene, photon_rate.view(g, knobs, margin, effects), picture)
     transfer = scene_transfer(solved.response, scene.spectra, effects, knobs.wavelength_step)
     return OpticalPath(transfer, g, knobs, colors, effects, 1), scene
 

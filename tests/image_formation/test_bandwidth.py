@@ -593,3 +593,24 @@ def test_the_margin_is_wide_enough_for_light_beyond_the_well(chart, time, tmp_pa
         bandwidth.MARGIN_SHARE * made.accuracy.tolerance * ablation.full_signal_of(wide, truth)
     )
     assert 0 < rms(raw - truth) <= allowed
+
+
+@pytest.mark.parametrize("speed", [-40, 15, 60])
+def test_a_chart_is_as_long_as_rows_see_it(speed, tmp_path):
+    """Rows that are read one after the other see a chart stretched that moves along the columns.
+
+    It is a whole number of their distances long: its waves fold onto them.
+    """
+    made = camera(
+        tmp_path,
+        {
+            "scene.source": {"kind": "chart", "chart": "colorchecker"},
+            "scene.camera_motion": {"tilt": f"{speed} deg/s"},
+            "exposure": {"time": "1 ms", "shutter": {"rolling": {"line_time": "20 us"}}},
+        },
+    )
+    path, scene = of_camera(made)
+    assert abs(path.drift[1]) > 1e-3
+    _, y = bandwidth.axes(path, scene, 2.0)
+    assert y.virtual_pixels is not None
+    assert y.length / path.geometry.pitch_y != pytest.approx(scene.shape[0], rel=1e-4)

@@ -25,7 +25,7 @@ from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.image_formation.light_plan import LightPlan, light_plan
 from vcam_cli.image_formation.optical_path import Layer, OpticalPath, SpectrumReport
 from vcam_cli.image_formation.settings import Settings
-from vcam_cli.image_formation.warps import warped_layers
+from vcam_cli.image_formation.warps import covered, warped_layers
 from vcam_cli.parallel import each
 from vcam_cli.rng import runs_of_blocks
 from vcam_cli.scenes.base import View
@@ -36,6 +36,9 @@ CELL_ERROR = 0.5
 As cells are finer than the blur, pixels err by 0.07 tolerances by it at most: measured on leaves
 and the still life from `draft` to `reference`, well exposed and ten times over."""
 
+MOST_DRIFT = 0.5
+"""Drift of the image over the way of its readout up to which a chart is as long as rows see it: it
+covers the array then, with the margin that motion asks for."""
 AT_ONCE = 1 << 16
 """Pixels whose light is gathered at once, at least: in blocks of 64 rows, a uniform chart on two
 columns took twice the time."""
@@ -45,7 +48,7 @@ def view(
     geometry: Geometry,
     settings: Settings,
     margin: int,
-    covered: tuple[float, float] | None = None,
+    effects: Sequence[Effect] = (),
 ) -> View:
     """Return the rectangle that a scene has to fill, with a margin.
 
@@ -57,25 +60,28 @@ def view(
         Settings of image formation.
     margin : int
         Pixels that a chart goes on beyond the array.
-    covered : tuple of float, optional
-        Width and height that a scene covers before a lens that distorts [m].
+    effects : sequence of Effect, optional
+        Effects of the camera: a lens that distorts covers more of a scene, and rows that are read
+        one after the other see a scene that moves stretched.
 
     Returns
     -------
     View
         The rectangle.
     """
+    drift = math.fsum(motion.drift[1] for motion in of_kind(effects, ImageMotion))
+    stretch = 1 - drift if abs(drift) < MOST_DRIFT else 1.0
     return View(
         rows=geometry.rows,
         columns=geometry.columns,
         pitch_x=geometry.pitch_x,
         pitch_y=geometry.pitch_y,
         margin=margin,
-        sampling_scale=geometry.sampling_scale,
+        seen=(geometry.sampling_scale, geometry.sampling_scale * stretch),
         scene_width=geometry.scene_width_on_sensor,
         dtype=settings.dtype,
         cell_error=CELL_ERROR * settings.tolerance,
-        covered=covered,
+        covered=covered(effects, geometry),
     )
 
 

@@ -39,8 +39,8 @@ class View:
     scene_width: [m] on the sensor when the scene's extent has a width, None when the scene covers
     the array; dtype of planes; cell_error: what means over a chart's cells may err, rms of white;
     covered: [m] width and height that a scene covers where a lens distorts, None for the array's;
-    sampling_scale: pitch of what photodetectors see over that of pixels. A chart is a whole number
-    of the former long: its waves fold onto the pixels', which takes a quarter of the time.
+    seen: pitches of what photodetectors see over those of pixels, along x and y. A chart is a whole
+    number of the former long: its waves fold onto the pixels', which takes a quarter of the time.
     """
 
     rows: int
@@ -53,7 +53,7 @@ class View:
     dtype: DTypeLike = np.float64
     cell_error: float = 0.0
     covered: tuple[float, float] | None = None
-    sampling_scale: float = 1.0
+    seen: tuple[float, float] = (1.0, 1.0)
 
     @property
     def width(self) -> float:

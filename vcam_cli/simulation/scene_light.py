@@ -21,7 +21,6 @@ from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.pixel_response import scene_transfer
 from vcam_cli.image_formation.rate_cache import RateCache
 from vcam_cli.image_formation.transfer_functions import Transfer
-from vcam_cli.image_formation.warps import covered
 from vcam_cli.quality import scielab
 from vcam_cli.quality.display import display_screen
 from vcam_cli.readout import auto_exposure, exposure
@@ -416,7 +415,7 @@ def _scene(
     pixels = bandwidth.margin(
         lattice, effects, (band.start, band.stop), solved.settings, overexposure
     )
-    view = photon_rate.view(lattice, solved.settings, pixels, covered(effects, lattice))
+    view = photon_rate.view(lattice, solved.settings, pixels, effects)
     scene = build_scene(solved, view, picture, overexposure)
     if not solved.output.radiance or isinstance(scene, DepthScene | LayeredScene):
         return scene
