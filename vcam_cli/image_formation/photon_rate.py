@@ -38,7 +38,7 @@ and the still life from `draft` to `reference`, well exposed and ten times over.
 
 MOST_DRIFT = 0.5
 """Drift of the image over the way of its readout up to which a chart is as long as rows see it: it
-covers the array then, with the margin that motion asks for."""
+covers the array then, with the margin that motion needs."""
 AT_ONCE = 1 << 16
 """Pixels whose light is gathered at once, at least: in blocks of 64 rows, a uniform chart on two
 columns took twice the time."""

@@ -43,7 +43,7 @@ def lens_contrast(path: OpticalPath, frequency: Array) -> Array:
 
 
 _CONTRASTS: ByteCache[Array] = ByteCache(1 << 20)
-"""Those of the last lenses: planning, metering and painting ask for the same."""
+"""Those of the last lenses: planning, metering and painting need the same."""
 
 
 def _contrast(path: OpticalPath, frequency: Array) -> Array:
