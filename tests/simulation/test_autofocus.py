@@ -13,6 +13,7 @@ from vcam_cli.progress import Silent
 from vcam_cli.simulation import autofocus, cost_model
 from vcam_cli.simulation.simulate import prepare
 from vcam_cli.solve.idle_keys import idle_keys
+from vcam_cli.solve.solved import solve
 
 EDGE = {
     "scene.source": {"kind": "chart", "chart": "slanted-edge"},
@@ -244,6 +245,45 @@ def test_a_distance_that_is_not_focused_is_found_by_phase(tmp_path):
     f = 5e-3
     expected = f * 1 / (1 - f) - f * 2 / (2 - f)
     assert ready.camera.optics.defocus == pytest.approx(-expected, abs=1e-6)
+
+
+class Told:
+    """Trials that say what a list has, from the first place on."""
+
+    def __init__(self, *phases: tuple[float, float], contrast: float = 0.0) -> None:
+        self.phases, self.contrast = iter(phases), contrast
+
+    def phase(self, place: float) -> tuple[float, float]:
+        return next(self.phases)
+
+    def sharpness(self, place: float) -> float:
+        return self.contrast * (1 + 1e3 * place)
+
+
+def test_half_images_that_lead_astray_give_way_to_contrast(tmp_path):
+    """As of a star before 48 x 64 pixels, 60 um out of focus: they led to -68 um, less sharp."""
+    solved = solve(camera(tmp_path, PHASE | {"optics.defocus": "-60 um"}))
+    astray = Told((0.398, 7.4e-4), (-0.174, 2.5e-4), (0.046, 5.3e-4), (0.008, 4.6e-4))
+    assert autofocus._by_phase(solved, astray) is None
+    found = autofocus._by_phase(solved, Told((-0.4, 7.4e-4), (0.1, 0.3), (0.01, 0.299)))
+    assert found is not None
+    assert found[0] != pytest.approx(-60e-6)
+    assert autofocus._by_phase(solved, Told((0.0, 1e-7))) is None, "no detail but errors"
+
+
+def test_contrast_of_the_trials_own_error_is_no_detail(tmp_path):
+    solved = solve(camera(tmp_path, EDGE | {"optics.defocus": "-60 um"}))
+    for contrast, says in ((2e-6, "finds no detail"), (2e-4, "moves the image plane")):
+        place, (note,) = autofocus._search(solved, Told(contrast=contrast))
+        assert says in note
+        assert (place == pytest.approx(-60e-6)) == ("no detail" in says)
+
+
+@pytest.mark.long
+def test_few_pixels_of_a_star_are_focused(tmp_path):
+    few = PHASE | {"optics.defocus": "-60 um", "array.rows": 48, "array.columns": 64}
+    ready, _ = prepare(camera(tmp_path, few))
+    assert abs(ready.camera.optics.defocus) < DEPTH
 
 
 def test_level_lines_tell_no_phase_and_contrast_takes_over(tmp_path):

@@ -5,8 +5,8 @@ By phase, where pixels tell the halves of the lens apart: half images lie beside
 
     move = -(3 pi / 4) N disparity,   disparity on the sensor, N the working f-number
 
-A few such moves reach the best place. Else, or where half images tell nothing, by contrast: the
-lens is tried at places of the image plane, first widely apart, then between the best ones; what is
+A few such moves reach the best place. Else, or where half images tell nothing or move the lens to
+where less contrast is left, by contrast: the lens is tried at places of the image plane, first widely apart, then between the best ones; what is
 judged is the noise-free light in a window of the array, as the pixels see it: the mean square of
 the differences between neighbors of one color, relative to the squared mean; of pixels at places of
 their own, the variance of each color. Lens aberrations, the scene's detail and the pixels' aperture
@@ -58,6 +58,8 @@ MOST = 24
 """Largest disparity that is looked for [blocks of colors]."""
 LEAST_GAIN = 1e-3
 """Relative gain in contrast below which nothing in the scene tells where it is sharp."""
+LEAST_CONTRAST = 4 * TOLERANCE**2
+"""Contrast that the error of the trials makes of even light: two differences of two pixels each."""
 
 
 Prepare = Callable[[Solved], Prepared]
@@ -117,10 +119,16 @@ class _Trials:
         self.seconds = 0.0
         """Estimated time of the trials so far [s]."""
 
-    def disparity(self, shift: float) -> float | None:
-        """Return that of the half images with the image plane at a place [pixels], if any."""
+    def phase(self, shift: float) -> tuple[float, float] | None:
+        """Return the disparity of the half images with the image plane at a place, and contrast.
+
+        The disparity is in pixels; None where half images tell none.
+        """
         ready = self._ready(shift)
-        return None if ready is None else phase_disparity(ready, self._window)
+        found = None if ready is None else phase_disparity(ready, self._window)
+        if ready is None or found is None:
+            return None
+        return found, _contrast_of_pixels(ready, self._window)
 
     def sharpness(self, shift: float) -> float:
         """Return the contrast with the image plane at a place [m]."""
@@ -147,11 +155,17 @@ def _by_phase(camera: Solved, trials: _Trials) -> tuple[float, tuple[str, ...]] 
     start = place = camera.optics.defocus
     per_pixel = 3 * math.pi / 4 * solved.working_f_number * solved.pitch_x / phase.separation
     seen = SEEN * (1 if phase.masked is None else 2 * phase.masked.period[1])
+    least = LEAST_CONTRAST
     for _ in range(MOVES):
-        found = trials.disparity(place)
-        if found is None:
+        told = trials.phase(place)
+        if told is None:
             return None
+        found, contrast = told
+        if place == start:
+            least = max(contrast, LEAST_CONTRAST)
         if abs(found) < seen:
+            if contrast < least:  # half images of few pixels, or of a pattern that repeats
+                return None
             moved = (place - start) * 1e6
             return place, (f"focus: auto moves the image plane by {moved:+.4g} um, by phase",)
         place -= per_pixel * found
@@ -165,7 +179,7 @@ def _search(camera: Solved, trials: _Trials) -> tuple[float, tuple[str, ...]]:
     places = np.linspace(-reach, reach, COARSE)
     values = [trials.sharpness(float(place)) for place in places]
     best = int(np.argmax(values))
-    if values[best] <= (1 + LEAST_GAIN) * min(values):
+    if values[best] <= max((1 + LEAST_GAIN) * min(values), LEAST_CONTRAST):
         return start, ("focus: auto finds no detail, and the lens stays put",)
     step = float(places[1] - places[0])
     low, high = float(places[best]) - step, float(places[best]) + step
