@@ -79,7 +79,7 @@ def test_forty_scenes_are_sums_over_rays(seed, tmp_path):
 
 def test_layers_are_a_sum_over_points_of_the_pupil(tmp_path):
     scene = random_scene(np.random.default_rng(5), 2)
-    check(scene, pupil_sum(scene, WAVELENGTH, 350, 5), tmp_path, unsure=FEW)
+    check(scene, pupil_sum(scene, WAVELENGTH, 350, 4), tmp_path, unsure=FEW)
 
 
 @pytest.mark.long

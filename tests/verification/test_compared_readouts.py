@@ -105,11 +105,16 @@ def test_merged_codes_are_not_fitted(bench):
 def test_the_camera_predicts_all_of_its_readouts(readout, bench):
     """Means within 1 %, and no quantity of noise beyond the bound of its many.
 
-    Three frames of a gain find what six do; of merged codes six find a pattern that three miss.
+    Three frames of every second level of a gain find what six of all do; of merged codes six find
+    a pattern that three miss.
     """
     camera = load(bench / "two.yaml")
-    tree = (bench / f"bench-{readout}.yaml").read_text()
-    (bench / f"some-{readout}.yaml").write_text(tree.replace("*", "[0-2]") if readout else tree)
+    tree = yaml.safe_load((bench / f"bench-{readout}.yaml").read_text())
+    if readout:
+        del tree["frames"][2::2]
+        for frames in tree["frames"]:
+            frames["files"] = frames["files"].replace("*", "[0-2]")
+    (bench / f"some-{readout}.yaml").write_text(yaml.safe_dump(tree))
     file = measurement_file.read(bench / f"some-{readout}.yaml")
     found = verify(camera, file)
     rows = [row for row in found.rows if row.quantity.startswith("mean")]
