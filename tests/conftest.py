@@ -30,7 +30,7 @@ sys.dont_write_bytecode = False
 gc.disable()  # until all tests are collected: what is made there stays
 
 settings.register_profile("vcam", derandomize=True, database=None, deadline=None)
-settings.load_profile("vcam")
+settings.register_profile("quick", settings.get_profile("vcam"), max_examples=40)
 
 
 BLANK = {"png": b"\x89PNG\r\n\x1a\n", "svg": b"<?xml", "pdf": b"%PDF"}
@@ -70,10 +70,20 @@ def figure_or_blank(path: Path | str, *args: Any, **options: Any) -> Iterator[An
 plots.plot_figure = figure_or_blank  # before other modules import it by its name
 
 
+def is_quick(config: pytest.Config) -> bool:
+    """Whether the tests marked `long` are left out."""
+    return "not long" in config.option.markexpr
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Let properties hold for 40 examples where time counts, else for 100, unless a test says."""
+    settings.load_profile("quick" if is_quick(config) else "vcam")
+
+
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Draw plots in tests with the mark `draws` and in their fixtures, and in all `long` runs."""
     global are_drawn
-    are_drawn = "draws" in item.keywords or "not long" not in item.config.option.markexpr
+    are_drawn = "draws" in item.keywords or not is_quick(item.config)
 
 
 def pytest_collection_finish() -> None:

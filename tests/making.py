@@ -56,10 +56,18 @@ QUIET = {
 """`effects` of a camera without any randomness."""
 
 
-def long_except(quick: Collection[Any], values: Iterable[Any]) -> list[Any]:
-    """Parameters of a test of which only some are tried by `make test`, all by `make test-all`."""
+def long_except(
+    quick: Collection[Any], values: Iterable[Any], several: bool = False
+) -> list[Any]:
+    """Parameters of a test of which only some are tried by `make test`, all by `make test-all`.
+
+    several: each value is a tuple of several parameters.
+    """
     return [
-        value if value in quick else pytest.param(value, marks=pytest.mark.long) for value in values
+        value
+        if value in quick
+        else pytest.param(*(value if several else [value]), marks=pytest.mark.long)
+        for value in values
     ]
 
 

@@ -201,7 +201,7 @@ def test_a_file_stands_in_place_of_speeds(tmp_path):
 
 def test_what_was_read_of_a_file_is_said(tmp_path):
     file = tmp_path / "imu.csv"
-    file.write_text("time_s,pan_deg,acc_x\n0,0,9\n1,30,9\n", encoding="utf-8")
+    file.write_text("time_s,pan_deg,acc_x\n0,0,9\n1,0.3,9\n", encoding="utf-8")
     source = {"scene.source": {"kind": "chart", "chart": "slanted-edge"}}
     few = {"array.rows": 8, "array.columns": 8}
     notes = simulate(camera(tmp_path, STILL | source | few | recorded(file))).notes

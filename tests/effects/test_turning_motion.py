@@ -82,7 +82,7 @@ def test_lines_across_columns_see_a_scene_that_passes_by(tmp_path):
         assert moved.frame.spectrum.sub_exposures == 1
 
 
-FINE = 16
+FINE = 8
 """Samples of a picture along each side of a pixel."""
 
 

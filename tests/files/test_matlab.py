@@ -27,7 +27,7 @@ OTHERS = {"text": "words", "cell": np.array([1, "a"], object), "no": np.array([[
 
 
 @settings(
-    max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )  # one folder is enough
 @given(values=st.dictionaries(NAMES, VALUES, max_size=4), compress=st.booleans())
 def test_reads_what_scipy_reads(values, compress, tmp_path):

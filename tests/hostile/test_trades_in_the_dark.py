@@ -14,7 +14,7 @@ from making import long_except
 
 from vcam_cli import load, schedule, sweep
 from vcam_cli.accuracy_study.study import accuracy
-from vcam_cli.characterization import bench
+from vcam_cli.characterization import bench, exposures
 from vcam_cli.characterization.characterize import characterize
 from vcam_cli.errors import BadInput
 
@@ -128,7 +128,13 @@ def test_benches(sees, treatment, tmp_path, monkeypatch):
     But of rounding: light ten times as bright is another number in 32 bits, by which some draws of
     noise are other electrons. That is far below the noise of MTF50, around 1e-3.
     """
-    monkeypatch.setattr(bench, "FIELD", 192)
+    for module, name, value in (
+        (bench, "FIELD", 64),
+        (exposures, "STACK", 4),
+        (exposures, "EDGES", 4),
+        (exposures, "REACH", 20),
+    ):
+        monkeypatch.setattr(module, name, value)
     time = {"exposure": {"time": "20 ms"}}
     lit, made = (
         load(camera_file(tmp_path, "starter", changes | time)) for changes in ({}, SEES[sees])

@@ -1,5 +1,6 @@
 """What the plan makes of effects on the light."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -98,14 +99,21 @@ CLOSE = {"pixel.width": "20 um", "optics.f_number": 2}
 CHARTS = ("step-wedge", "slanted-edge", "colorchecker")
 
 
-@pytest.mark.parametrize("chart", CHARTS)
+BLURS = {"lens": CLOSE, "silicon": CLOSE | SILICON, "coma": CLOSE | COMA}
+
+
 @pytest.mark.parametrize(
-    "keys", [CLOSE, CLOSE | SILICON, CLOSE | COMA], ids=["lens", "silicon", "coma"]
+    ("blurs", "chart"),
+    long_except(
+        {("lens", chart) for chart in CHARTS} | {("silicon", "slanted-edge"), ("coma", "step-wedge")},
+        itertools.product(BLURS, CHARTS),
+        several=True,
+    ),
 )
-def test_each_blur_changes_at_most_its_bound(chart, keys, tmp_path, monkeypatch):
+def test_each_blur_changes_at_most_its_bound(blurs, chart, tmp_path, monkeypatch):
     """The light with all effects, less that without one; sums over edges are not far off."""
     monkeypatch.setattr(light_plan, "EXACT", -1.0)  # exact sums, whatever they take
-    changes = SIZE | keys | {"scene.source": {"kind": "chart", "chart": chart}}
+    changes = SIZE | BLURS[blurs] | {"scene.source": {"kind": "chart", "chart": chart}}
     path, scene = of_camera(camera(tmp_path, changes | {"accuracy": 0.2}))
     blurs = of_kind(path.effects, Blur)
     path = replace(path, optional=blurs, settings=replace(path.settings, tolerance=10.0))
@@ -130,7 +138,9 @@ LENS = {"optics.f_number": 1.4, "pixel.width": "7.7 um", "pixel.photodetector.fi
 
 
 @pytest.mark.parametrize("seed", long_except([0, 1], range(4)))
-@pytest.mark.parametrize(("samples", "pixels"), [(1, 48), (3, 16), (4, 25), (1, 15)])
+@pytest.mark.parametrize(
+    ("samples", "pixels"), long_except([(3, 16), (1, 15)], [(1, 48), (3, 16), (4, 25), (1, 15)], True)
+)
 @pytest.mark.parametrize("kind", ["star", "row", "column"])
 def test_lone_light_is_seen_wherever_it_is(kind, samples, pixels, seed, tmp_path):
     """One sample, row or column that is lit: with every plan as with all effects."""
