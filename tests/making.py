@@ -56,9 +56,7 @@ QUIET = {
 """`effects` of a camera without any randomness."""
 
 
-def long_except(
-    quick: Collection[Any], values: Iterable[Any], several: bool = False
-) -> list[Any]:
+def long_except(quick: Collection[Any], values: Iterable[Any], several: bool = False) -> list[Any]:
     """Parameters of a test of which only some are tried by `make test`, all by `make test-all`.
 
     several: each value is a tuple of several parameters.

@@ -5,6 +5,7 @@ may choose; 1e-6 at `reference` where neither side approximates. Lamps are unifo
 where a picture has to be blurred wavelength by wavelength.
 """
 
+import itertools
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +16,7 @@ import reference as ref
 import reference_pixel as layers
 import reference_readout as readout
 import reference_scenes as scenes
+from making import long_except
 from reference_cameras import READOUT, Case, continuous, error, leaves, lines, setup_of
 from reference_process import PROCESSES, photodiode
 from reference_scenes import flat, lamp
@@ -275,8 +277,12 @@ def test_tunnels_over_a_junction(tmp_path):
     check(Case(yaml, reference, PICTURE), tmp_path)
 
 
-@pytest.mark.parametrize("shift", ["optimal", "centered"])
-@pytest.mark.parametrize("told", ["gain: 1.8", "efficiency: 0.81"])
+LENSLETS = list(itertools.product(["gain: 1.8", "efficiency: 0.81"], ["optimal", "centered"]))
+
+
+@pytest.mark.parametrize(
+    ("told", "shift"), long_except([LENSLETS[0], LENSLETS[-1]], LENSLETS, several=True)
+)
 def test_microlenses(shift, told, tmp_path):
     # the collecting area, centered in its pixel, takes the photodetector's place as aperture; sharp
     # light, so that its shift shows

@@ -4,6 +4,8 @@ Each case is the good file of `broken_camera.py` with some text replaced, and th
 on stderr: all of them and no others. Cases lie in a file for each topic.
 """
 
+import contextlib
+import os
 import re
 from pathlib import Path
 
@@ -28,10 +30,25 @@ TOPICS = (
 CASES = {name: case for topic in TOPICS for name, case in topic.CASES.items()}
 
 
+@pytest.fixture(scope="module")
+def inputs(tmp_path_factory) -> Path:
+    """A folder of pictures and tables, whole and broken."""
+    place = tmp_path_factory.mktemp("inputs")
+    with contextlib.chdir(place):
+        _write_inputs()
+    return place
+
+
 @pytest.fixture
-def folder(tmp_path, monkeypatch) -> Path:
-    """The current folder: pictures and tables, whole and broken."""
+def folder(inputs, tmp_path, monkeypatch) -> Path:
+    """The current folder, which has them."""
+    for path in inputs.iterdir():
+        os.link(path, tmp_path / path.name)
     monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def _write_inputs() -> None:
     image("good.exr", np.full((4, 4, 3), 0.5))
     image("nan.exr", np.full((4, 4, 3), np.nan))
     image("negative.exr", np.full((4, 4, 3), -0.5))
@@ -49,7 +66,6 @@ def folder(tmp_path, monkeypatch) -> Path:
     Path("mixed.csv").write_text("wavelength_nm,value\n500,0.5\n700,0.5\n400,0.5\n")
     Path("words.csv").write_text("wavelength_nm,value\n400,high\n700,low\n")
     Path("loop.yaml").write_text("extends: ./loop.yaml\n")
-    return tmp_path
 
 
 def image(name: str, pixels: np.ndarray) -> None:

@@ -178,8 +178,8 @@ def test_a_full_disk_ends_with_3(monkeypatch):
 def test_ctrl_c_says_that_points_are_kept():
     """All points would take more than a minute: no wait for the disk outlasts them."""
     write(
-        {"array.rows": 400, "array.columns": 400, "scene.source.chart": "dead-leaves"},
-        vary={"pixel.width": {"start": "4 um", "stop": "6 um", "count": 600}},
+        {"array.rows": 500, "array.columns": 500, "scene.source.chart": "dead-leaves"},
+        vary={"pixel.width": {"start": "4 um", "stop": "6 um", "count": 100}},
     )
     command = [sys.executable, "-m", "vcam_cli.commands.main", "sweep", "study.yaml"]
     root = str(Path(module.__file__).parents[2])
@@ -194,7 +194,7 @@ def test_ctrl_c_says_that_points_are_kept():
     )
     signal.signal(signal.SIGINT, former)
     until = time.monotonic() + 60
-    while len(list(Path("out/study/points").glob("*.json"))) < 3 and time.monotonic() < until:
+    while len(list(Path("out/study/points").glob("*.json"))) < 1 and time.monotonic() < until:
         time.sleep(0.005)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)

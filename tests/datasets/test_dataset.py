@@ -172,7 +172,9 @@ def test_labels_are_the_moments_of_the_noise(tmp_path):
 def many(tmp_path_factory):
     """A data set of four parts in two shards."""
     folder = tmp_path_factory.mktemp("many")
-    study = written(folder, frames=150, shards=2, size={"rows": 10, "columns": 12}, write=["raw", "clean"])
+    study = written(
+        folder, frames=150, shards=2, size={"rows": 10, "columns": 12}, write=["raw", "clean"]
+    )
     sizes = [len(job) for job in parts_of(study)]
     assert len(sizes) == 4
     assert sum(sizes) == 150

@@ -39,9 +39,9 @@ def test_traps_are_found_with_their_errors(fraction, step, occupancy):
 
 
 def test_probabilities_are_those_of_numbers_drawn():
-    """Of a million pixels with traps: every bin to five standard errors of its count, and 2 %."""
+    """Of 300,000 pixels with traps: every bin to five standard errors of its count, and 2 %."""
     rng = np.random.default_rng(3)
-    count, step, occupancy = 1_000_000, 6.0, 0.3
+    count, step, occupancy = 300_000, 6.0, 0.3
     variance, third = np.empty(count), np.empty(count)
     for part in np.array_split(np.arange(count), 20):
         filled = rng.random((N, len(part))) < occupancy

@@ -5,6 +5,7 @@ Estimated is the rms over the array from the spectrum at hand; lost is the diffe
 scene followed as far as the engine goes: 24 pixel Nyquist frequencies, pictures as far as the lens.
 """
 
+import itertools
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -347,9 +348,16 @@ def test_loss_of_a_picture_is_known(kind, f_number, tmp_path):
     assert lost < rough.spectrum.lost_rms < lost * 4
 
 
-@pytest.mark.parametrize("preset", ["draft", "standard", "reference"])
-@pytest.mark.parametrize("lens", ["{}", "{7: 60 nm}"])
-@pytest.mark.parametrize("kind", ["noise", "blocks", "star"])
+PICTURES = list(
+    itertools.product(
+        ["noise", "blocks", "star"], ["{}", "{7: 60 nm}"], ["draft", "standard", "reference"]
+    )
+)
+
+
+@pytest.mark.parametrize(
+    ("kind", "lens", "preset"), long_except(PICTURES[::2], PICTURES, several=True)
+)
 def test_loss_of_a_picture_is_within_the_tolerance(kind, lens, preset, tmp_path):
     """Of full signal, which behind the lens is much less than before it where a point is alone."""
     changes, values = write_picture(tmp_path, kind)

@@ -105,7 +105,8 @@ BLURS = {"lens": CLOSE, "silicon": CLOSE | SILICON, "coma": CLOSE | COMA}
 @pytest.mark.parametrize(
     ("blurs", "chart"),
     long_except(
-        {("lens", chart) for chart in CHARTS} | {("silicon", "slanted-edge"), ("coma", "step-wedge")},
+        {("lens", chart) for chart in CHARTS}
+        | {("silicon", "slanted-edge"), ("coma", "step-wedge")},
         itertools.product(BLURS, CHARTS),
         several=True,
     ),
@@ -139,7 +140,8 @@ LENS = {"optics.f_number": 1.4, "pixel.width": "7.7 um", "pixel.photodetector.fi
 
 @pytest.mark.parametrize("seed", long_except([0, 1], range(4)))
 @pytest.mark.parametrize(
-    ("samples", "pixels"), long_except([(3, 16), (1, 15)], [(1, 48), (3, 16), (4, 25), (1, 15)], True)
+    ("samples", "pixels"),
+    long_except([(3, 16), (1, 15)], [(1, 48), (3, 16), (4, 25), (1, 15)], True),
 )
 @pytest.mark.parametrize("kind", ["star", "row", "column"])
 def test_lone_light_is_seen_wherever_it_is(kind, samples, pixels, seed, tmp_path):

@@ -21,9 +21,10 @@ def test_each_is_the_camera_alone(tmp_path, path):
     before = {k: v for k, v in changed(path, 0).items() if k != path}
     plain = before | ({path: BASE[path]} if path in BASE else {}) | DIM
     cameras = [camera(tmp_path, plain), camera(tmp_path, changed(path, CHANGES[path]) | DIM)]
-    for order in (cameras, cameras[::-1]):
-        for made, found in zip(order, exposures(order, 1, Shared()), strict=True):
-            alone = simulate(made, 1, shared=Shared())
+    each = [(made, simulate(made, 1, shared=Shared())) for made in cameras]
+    for order in (each, each[::-1]):
+        together = exposures([made for made, _ in order], 1, Shared())
+        for (_, alone), found in zip(order, together, strict=True):
             assert found.dn.tobytes() == alone.dn.tobytes()
             assert found.clean_dn.tobytes() == alone.clean_dn.tobytes()
             assert found.exposure_time == alone.exposure_time
