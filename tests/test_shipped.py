@@ -115,7 +115,7 @@ class TestCameras:
 
 
 TRACED = {"double-gauss", "phone-double-gauss"}
-"""Lenses by prescriptions, which take seconds: frames through them are tested in test_traced_*.py."""
+"""Lenses by prescriptions, which take seconds; test_traced_frames.py has frames through one."""
 
 
 @pytest.mark.parametrize("name", long_except(set(CAMERAS) - TRACED, CAMERAS))

@@ -27,9 +27,9 @@ def folder(tmp_path, monkeypatch) -> Path:
     return tmp_path
 
 
-def vcam(*args: str, code: int = 0):
+def vcam(*args: str, code: int = 0, env: dict[str, str] | None = None):
     """Runs a command in this process; gives what it printed."""
-    result = CliRunner().invoke(main.app, list(args), prog_name="vcam")
+    result = CliRunner().invoke(main.app, list(args), env=env, prog_name="vcam")
     assert result.exit_code == code, result.output
     return result
 
@@ -215,14 +215,14 @@ class TestMain:
         env = {"_VCAM_COMPLETE": "complete_bash", "COMP_WORDS": "vcam li", "COMP_CWORD": "1"}
         assert process(env=env).stdout.split() == ["list"]
         env = {"_VCAM_COMPLETE": "complete_bash", "COMP_WORDS": "vcam run start", "COMP_CWORD": "2"}
-        assert process(env=env).stdout.split() == ["starter"]
+        assert vcam(env=env).stdout.split() == ["starter"]
 
     def test_completion_of_settings(self):
         words = {"_VCAM_COMPLETE": "complete_bash", "COMP_CWORD": "4"}
         env = words | {"COMP_WORDS": "vcam run starter --set optics.f_n"}
-        assert process(env=env).stdout.split() == ["optics.f_number="]
+        assert vcam(env=env).stdout.split() == ["optics.f_number="]
         env = words | {"COMP_WORDS": "vcam schedule captures --set max_"}
-        assert process(env=env).stdout.split() == ["max_time_of="]
+        assert vcam(env=env).stdout.split() == ["max_time_of="]
 
     def test_completion_of_paths(self, folder):
         (folder / "cams").mkdir()

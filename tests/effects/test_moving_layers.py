@@ -22,8 +22,8 @@ def bar(folder, path: float) -> np.ndarray:
     }
     wall = {"source": {"kind": "chart", "chart": "uniform"}, "distance": "1 m"}
     source = {"kind": "layers", "layers": [near, wall]}
-    sharp = {"scene.source": source, "optics.diffraction": False}
-    return simulate(camera(folder, STILL | sharp)).mean_electrons[24]
+    sharp = {"scene.source": source, "optics.diffraction": False, "array.rows": 24}
+    return simulate(camera(folder, STILL | sharp)).mean_electrons[12]
 
 
 def spread(signal: np.ndarray) -> float:

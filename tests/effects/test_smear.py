@@ -20,6 +20,7 @@ STAR = {"kind": "chart", "chart": "siemens-star"}
 
 def shot(folder, state="on", **changes):
     base = {"scene.source": STAR, "effects": QUIET | {"smear": state}}
+    base |= {"array.rows": 24, "array.columns": 32}
     return simulate(camera(folder, base | ON | EXACT | changes))
 
 

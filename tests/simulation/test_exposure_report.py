@@ -5,15 +5,15 @@ The camera is `making.PLAIN` in even light: its signal is known from the light, 
 
 import json
 import math
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from making import GONE, QUIET, camera, radiance_for, tree
+from typer.testing import CliRunner
 
 from vcam_cli import load, simulate
+from vcam_cli.commands.main import app
 from vcam_cli.errors import BadInput
 from vcam_cli.simulation.figures import exposure_report
 
@@ -194,8 +194,9 @@ def test_a_run_says_how_it_was_exposed(tmp_path) -> None:
     changes |= quiet(0.39 * WELL / 3.3)
     (tmp_path / "made.yaml").write_text(json.dumps(tree(changes)))
     out = tmp_path / "out"
-    command = [sys.executable, "-m", "vcam_cli.commands.main", "run", "made.yaml", "-o", str(out)]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    command = ["run", str(tmp_path / "made.yaml"), "-o", str(out)]
+    done = CliRunner().invoke(app, command, prog_name="vcam")
+    assert done.exit_code == 0, done.output
     assert "exposure     33 ms at gain 1, ISO " in done.stdout
     assert "automatic, stopped at its longest time\n" in done.stdout
     assert "raw          peak 39 % of full scale; clipped Y 0 %\n" in done.stdout
