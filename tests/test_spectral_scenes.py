@@ -3,7 +3,6 @@
 import math
 import subprocess
 import sys
-import tracemalloc
 
 import numpy as np
 import OpenImageIO as oiio
@@ -187,25 +186,6 @@ print(peak, result.frame.plan.memory_bytes, result.dn.sum())
 """
 
 
-def test_both_kinds_of_files_are_read_in_strips(tmp_path):
-    """11 MB of samples, the same frame; no more than half of them at once."""
-    cube = np.random.default_rng(1).random((300, 300, 31), np.float32)
-    np.savez(tmp_path / "cube.npz", wavelength_nm=NM, radiance=cube)
-    envi(tmp_path / "cube.hdr", nm=NM, cube=cube, data_units="W/(m2 nm sr)")
-    frames = []
-    for kind in ("npz", "hdr"):
-        source = {"kind": "hyperspectral", "file": str(tmp_path / f"cube.{kind}")}
-        made = camera(tmp_path, PLAIN | {"scene.source": source, "accuracy": "draft"})
-        assert isinstance(read_cube(tmp_path / f"cube.{kind}", "file")[0].data, StoredSamples)
-        tracemalloc.start()
-        frames.append(simulate(made, 1).dn)
-        peak = tracemalloc.get_traced_memory()[1]
-        tracemalloc.stop()
-        assert peak < cube.nbytes / 2
-    np.testing.assert_array_equal(*frames)
-
-
-@pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="reads the peak from /proc")
 def test_memory_is_estimated_and_envi_files_stay_on_the_disk(tmp_path):
     """95 MB of samples, read in strips from both kinds of files; the same frame."""

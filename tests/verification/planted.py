@@ -106,10 +106,8 @@ CONDITIONS = {
 """Name -> exposure time [s], light over that which fills a pixel."""
 
 
-def true_camera(folder: Path, side: int = 96) -> Camera:
-    """The camera, of so many pixels along each side."""
-    array = TRUE["array"] | {"rows": side, "columns": side}
-    (folder / "true.yaml").write_text(yaml.safe_dump(TRUE | {"array": array}))
+def true_camera(folder: Path) -> Camera:
+    (folder / "true.yaml").write_text(yaml.safe_dump(TRUE))
     return load(folder / "true.yaml")
 
 

@@ -30,7 +30,7 @@ frames in which that is seen."""
 @pytest.fixture(scope="module")
 def taken(tmp_path_factory):
     folder = tmp_path_factory.mktemp("planted")
-    camera = planted.true_camera(folder, 64)
+    camera = planted.true_camera(folder)
     return camera, folder, planted.bench(camera, folder, 3, FEW, 4)
 
 
