@@ -20,14 +20,13 @@ STAR = {"kind": "chart", "chart": "siemens-star"}
 
 def shot(folder, state="on", **changes):
     base = {"scene.source": STAR, "effects": QUIET | {"smear": state}}
-    base |= {"array.rows": 24, "array.columns": 32}
     return simulate(camera(folder, base | ON | EXACT | changes))
 
 
 @pytest.mark.parametrize("electrons", [500, 3e6])
 def test_part_of_the_light_lies_evenly_on_the_column(electrons, tmp_path):
     """Closed form, also of light that fills wells many times; and no charge is lost."""
-    light = {"scene.radiance": radiance_for(electrons)}
+    light = {"scene.radiance": radiance_for(electrons), "array.rows": 24, "array.columns": 32}
     plain = shot(tmp_path, "off", **light).mean_electrons
     found = shot(tmp_path, **light).mean_electrons
     expected = (1 - SHARE) * plain + SHARE * plain.mean(axis=0)
