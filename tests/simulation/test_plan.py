@@ -173,10 +173,10 @@ EVERY = pytest.mark.parametrize(
 """Of the whole module: all tests of a camera run together, in one process, and share its frames."""
 PROMISED = pytest.mark.parametrize(
     "name",
-    long_except(CAMERAS.keys() - {"letters near, a star far away", "daylight in color"}, CAMERAS),
+    long_except(CAMERAS.keys() - {"letters near, a star far away"}, CAMERAS),
     scope="module",
 )
-"""Cameras whose every effect at reference takes less than a second."""
+"""All but one, whose every effect at reference takes seconds."""
 
 
 def decisions(result) -> dict[str, Decision]:
