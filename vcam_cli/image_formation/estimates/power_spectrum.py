@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, reduce
 
 import numpy as np
 
@@ -150,8 +150,7 @@ class PowerSpectrum:
         Array
             Mean squares (C, blocks along y, blocks along x) [(e/s)^2].
         """
-        middle: Array = self._power_at_places(tables, self.products)[1]
-        return middle
+        return self._passed_power(tables, 1, self.products)
 
     def pixel_power(self, power: Array) -> Array:
         """Return mean squares behind the separable transfer functions.
@@ -184,16 +183,17 @@ class PowerSpectrum:
         Array
             Mean squares (C, blocks along y, blocks along x) [(e/s)^2].
         """
-        return self.pixel_power(self._power_at_places(tables, self.largest_products).max(axis=0))
+        powers = (self._passed_power(tables, n, self.largest_products) for n in range(3))
+        return self.pixel_power(reduce(np.maximum, powers))
 
-    def _power_at_places(self, tables: Tables, products: Array) -> Array:
-        """Return what a lens passes at the `places` of the blocks (3, C, along y, along x)."""
-        power = np.zeros((3, tables.colors, len(self.y.low), len(self.x.low)))
+    def _passed_power(self, tables: Tables, place: int, products: Array) -> Array:
+        """Return what a lens passes at one of the `places` of the blocks (C, along y, along x)."""
+        power = np.zeros((tables.colors, len(self.y.low), len(self.x.low)))
         for parity in tables.parities:
-            values = _values(tables, parity, self.x, self.y)
+            values = _values(tables, parity, self.x, self.y, place)
             for (r, s), squares in zip(self.pairs, products, strict=True):
                 both = tables.is_seen[r] & tables.is_seen[s]
-                power[:, both] += values[:, r, both] * values[:, s, both] * squares
+                power[both] += values[r, both] * values[s, both] * squares
         return np.maximum(power, 0)
 
     def upper_bound(self, tables: Tables) -> Array:
@@ -211,7 +211,8 @@ class PowerSpectrum:
         Array
             Mean squares (C, blocks along y, blocks along x) [(e/s)^2].
         """
-        values = np.abs(_values(tables, 0, self.x, self.y)).max(axis=0)
+        read = (np.abs(_values(tables, 0, self.x, self.y, place)) for place in range(3))
+        values = reduce(np.maximum, read)
         every = zip(self.pairs, self.largest_products, strict=True)
         own = [squares for (r, s), squares in every if r == s]
         amplitudes = values * np.sqrt(np.maximum(own, 0))[:, None]
@@ -303,18 +304,17 @@ class PowerSpectrum:
         return frequency, np.array(left)
 
 
-def _values(tables: Tables, parity: int, x: Blocks, y: Blocks) -> Array:
-    """Return tables at the `places` of the blocks (3, R, C, blocks along y, along x) [e/s]."""
+def _values(tables: Tables, parity: int, x: Blocks, y: Blocks, place: int) -> Array:
+    """Return tables at one of the `places` of the blocks (R, C, along y, along x) [e/s]."""
     read = _read_radial if tables.is_radial else _read_tables
-    return read(tables, parity, x, y)
+    return read(tables, parity, x, y, place)
 
 
-def _read_tables(tables: Tables, parity: int, x: Blocks, y: Blocks) -> Array:
-    ends = zip(y.places, x.places, strict=True)
-    return np.array([reader(tables, parity, fx).values(fy) for fy, fx in ends])
+def _read_tables(tables: Tables, parity: int, x: Blocks, y: Blocks, place: int) -> Array:
+    return reader(tables, parity, x.places[place]).values(y.places[place])
 
 
-_read_radial = lru_cache(4)(_read_tables)
+_read_radial = lru_cache(12)(_read_tables)
 """Values of one lens are the same for all pictures of a size."""
 
 
