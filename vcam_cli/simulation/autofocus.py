@@ -6,11 +6,12 @@ By phase, where pixels tell the halves of the lens apart: half images lie beside
     move = -(3 pi / 4) N disparity,   disparity on the sensor, N the working f-number
 
 A few such moves reach the best place. Else, or where half images tell nothing or move the lens to
-where less contrast is left, by contrast: the lens is tried at places of the image plane, first widely apart, then between the best ones; what is
-judged is the noise-free light in a window of the array, as the pixels see it: the mean square of
-the differences between neighbors of one color, relative to the squared mean; of pixels at places of
-their own, the variance of each color. Lens aberrations, the scene's detail and the pixels' aperture
-so have their say in what is sharpest. By phase, aberrations other than defocus have none.
+where less contrast is left, by contrast: the lens is tried at places of the image plane, first
+widely apart, then between the best ones; what is judged is the noise-free light in a window of the
+array, as the pixels see it: the mean square of the differences between neighbors of one color,
+relative to the squared mean; of pixels at places of their own, the variance of each color. Lens
+aberrations, the scene's detail and the pixels' aperture so have their say in what is sharpest. By
+phase, aberrations other than defocus have none.
 
 References
 ----------
