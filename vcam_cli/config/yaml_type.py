@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any
 
-from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler, TypeAdapter
 from pydantic_core import CoreSchema, core_schema
 
 DEFINED = "x-definition"
@@ -36,12 +36,8 @@ class YamlType(ABC):
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        forms = (
-            core_schema.any_schema() if self.forms is None else handler.generate_schema(self.forms)
-        )
         return core_schema.no_info_plain_validator_function(
             self.read,
-            json_schema_input_schema=forms,
             serialization=core_schema.plain_serializer_function_ser_schema(
                 self.write, when_used="json"
             ),
@@ -50,7 +46,14 @@ class YamlType(ABC):
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        return self.json_schema(dict(handler(schema)))
+        # Here and not above: building the forms of all keys takes longer than reading a file.
+        forms = (
+            core_schema.any_schema() if self.forms is None else TypeAdapter(self.forms).core_schema
+        )
+        given = core_schema.no_info_plain_validator_function(
+            self.read, json_schema_input_schema=forms
+        )
+        return self.json_schema(dict(handler(given)))
 
 
 def to_yaml(value: Any) -> Any:
