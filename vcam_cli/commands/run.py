@@ -48,7 +48,6 @@ def run(
     from vcam_cli.files.folder import OutputFolder
     from vcam_cli.files.report import to_json
     from vcam_cli.simulation.output import outputs, provenance
-    from vcam_cli.simulation.sequence import write_sequence
     from vcam_cli.simulation.simulate import simulate
 
     inputs = provenance.inputs(model)
@@ -59,6 +58,8 @@ def run(
             result = simulate(model, workers, progress, device=device)
             outputs.write(result, folder)
         else:
+            from vcam_cli.simulation.sequence import write_sequence
+
             assert fps is not None
             result, memory = write_sequence(model, frames, fps, folder, workers, progress, device)
         record = outputs.finish(result, folder, inputs, lambda: time.perf_counter() - start, memory)

@@ -9,6 +9,8 @@
 - No light in any color: none at the pixels.
 - Everything else: the cosine spectrum, multiplied by the transfer function and folded onto the
   pixels, as finely as the tolerance asks (`bandwidth.py`, `chart_cells.py`).
+
+A way that few scenes go is imported where it is gone.
 """
 
 from __future__ import annotations
@@ -59,11 +61,7 @@ from vcam_cli.image_formation.harmonic_scenes import (
     harmonics_count,
     wave_layers,
 )
-from vcam_cli.image_formation.layers.cut_image import cut_image
-from vcam_cli.image_formation.layers.layered import layered_image
 from vcam_cli.image_formation.optical_path import Layer, Layers, OpticalPath, SpectrumReport
-from vcam_cli.image_formation.profile_scenes import profile_layers
-from vcam_cli.image_formation.spot_average import spot_averages
 from vcam_cli.image_formation.sub_exposures import sub_exposed_layers, sub_exposed_motion
 from vcam_cli.image_formation.transfer_tables import Tables, mixtures, tabulate
 from vcam_cli.physics.cache import remembered
@@ -107,10 +105,14 @@ def image_layers(path: OpticalPath, scene: AnyScene) -> tuple[Layers, SpectrumRe
         return _dark_layers(path)
     if isinstance(scene, LayeredScene):
         if path.layers:
+            from vcam_cli.image_formation.layers.layered import layered_image
+
             return layered_image(path, scene, image_layers)
         scene = scene.flat
     if isinstance(scene, DepthScene):
         if path.layers:
+            from vcam_cli.image_formation.layers.cut_image import cut_image
+
             return cut_image(path, scene, image_layers)
         scene = scene.flat
     if motion := sub_exposed_motion(path):
@@ -125,6 +127,8 @@ def image_layers(path: OpticalPath, scene: AnyScene) -> tuple[Layers, SpectrumRe
     if not path.transfer.effects and not path.field and path.averages_over_box:
         return _mean_layers(path, scene)
     if isinstance(scene, ChartScene) and (profile := scene.chart.profile()) is not None:
+        from vcam_cli.image_formation.profile_scenes import profile_layers
+
         found = profile_layers(path, profile)
         if found is not None:
             return found
@@ -180,6 +184,8 @@ def _spot_layers(
     g, level = path.geometry, path.transfer.level.T
     needed = memory_model.box_average_bytes(math.prod(scene.shape), len(level), g, path.settings)
     memory.require(needed, g.rows, g.columns)
+    from vcam_cli.image_formation.spot_average import spot_averages
+
     both = axes(path, scene, 1.0)
     signal = spot_averages(scene, level, g, both, spot, path.workers)
     sharp = box_averages(scene, level, g, both, path.workers)

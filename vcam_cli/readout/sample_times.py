@@ -9,16 +9,17 @@ which effects a plan leaves out.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.exposure import Exposure
 from vcam_cli.readout.chain import ReadoutChain
 from vcam_cli.readout.exposure import mean_dark
-from vcam_cli.readout.nondestructive_samples import variances
-from vcam_cli.scheduling.full_noise import optimal_schedules
-from vcam_cli.scheduling.pdf import photocurrent_levels
-from vcam_cli.scheduling.sensor import Sensor
+
+if TYPE_CHECKING:  # the search for times is imported where a camera has one
+    from vcam_cli.scheduling.sensor import Sensor
 
 
 def sensor(chain: ReadoutChain, longest: float) -> Sensor:
@@ -38,6 +39,9 @@ def sensor(chain: ReadoutChain, longest: float) -> Sensor:
     Sensor
         Model of the pixel.
     """
+    from vcam_cli.readout.nondestructive_samples import variances
+    from vcam_cli.scheduling.sensor import Sensor
+
     read, reset = variances(chain)
     return Sensor(
         well=chain.saturation,
@@ -97,6 +101,9 @@ def optimal_times(rate: Array, count: int, pixel: Sensor) -> tuple[float, ...]:
     ----------
     T. Chen, PhD thesis, Stanford University, 2003, chapter 4.
     """
+    from vcam_cli.scheduling.full_noise import optimal_schedules
+    from vcam_cli.scheduling.pdf import photocurrent_levels
+
     pdf = photocurrent_levels(rate)
     if pdf is None:
         filled = pixel.well / pixel.dark if pixel.dark > 0 else np.inf

@@ -14,7 +14,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar, Literal, Protocol
+from typing import ClassVar, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import DTypeLike
@@ -92,6 +92,7 @@ class Frame:
     height: float
 
 
+@runtime_checkable
 class Harmonics(Protocol):
     """A pattern that repeats along x and y, symmetric about the array's center along both."""
 

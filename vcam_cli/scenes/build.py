@@ -1,4 +1,7 @@
-"""From what the camera file says about the scene to light on the sensor plane."""
+"""From what the camera file says about the scene to light on the sensor plane.
+
+A chart is imported where it is built: a scene has one, and a camera file may name twelve.
+"""
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.scene import charts
@@ -6,23 +9,9 @@ from vcam_cli.camera.scene.scene import Scene as SceneModel
 from vcam_cli.camera.scene.scene_files import Hyperspectral, ImageFile
 from vcam_cli.errors import BadInput, bad
 from vcam_cli.scenes import light
-from vcam_cli.scenes.base import Chart, HarmonicScene, SampledScene, Scene, View
-from vcam_cli.scenes.charts import (
-    colorchecker,
-    csf,
-    dead_leaves,
-    eye_chart,
-    hdr_patches,
-    siemens_star,
-    sinusoid,
-    step_wedge,
-    uniform,
-)
-from vcam_cli.scenes.charts.csf import Csf
-from vcam_cli.scenes.charts.point_grid import PointGrid
+from vcam_cli.scenes.base import Chart, Harmonics, HarmonicScene, SampledScene, Scene, View
+from vcam_cli.scenes.charts import sinusoid, uniform
 from vcam_cli.scenes.charts.sinusoid import WaveChart
-from vcam_cli.scenes.charts.slanted_edge import SlantedEdge
-from vcam_cli.scenes.charts.still_life import LeavesWithColorChecker
 from vcam_cli.scenes.framed import chart_scene
 from vcam_cli.scenes.hyperspectral import Cube, cube_scene
 from vcam_cli.scenes.image import image_scene
@@ -79,7 +68,7 @@ def build(
     chart, reflectances = chart_and_reflectances(source, view)
     spectra = tuple(white.multiply(r) for r in reflectances)
     sampled = chart_scene(chart, spectra, white, view)
-    if isinstance(chart, PointGrid) and _fills(view):
+    if isinstance(chart, Harmonics) and _fills(view):
         return HarmonicScene(spectra, chart, white, sampled)
     return sampled
 
@@ -125,33 +114,55 @@ def _chart(source: object, view: View) -> tuple[Chart, tuple[Spectrum, ...]]:
     frame = view.frame
     match source:
         case charts.Csf():
+            from vcam_cli.scenes.charts import csf
+
             return (
-                Csf(frame, source.max_frequency, source.mean, source.max_contrast, source.phase),
+                csf.Csf(
+                    frame, source.max_frequency, source.mean, source.max_contrast, source.phase
+                ),
                 csf.modulation_colors(source.modulation),
             )
         case charts.SlantedEdge():
+            from vcam_cli.scenes.charts.slanted_edge import SlantedEdge
+
             return SlantedEdge(source.angle, source.contrast), gray
         case charts.ColorChecker():
+            from vcam_cli.scenes.charts import colorchecker
+
             card = colorchecker.largest_card(frame)
             return colorchecker.ColorChecker(card), colorchecker.reflectances()
         case charts.DeadLeaves():
+            from vcam_cli.scenes.charts import colorchecker, dead_leaves
+            from vcam_cli.scenes.charts.still_life import LeavesWithColorChecker
+
             leaves = dead_leaves.dead_leaves(source.seed, frame, view.cell_error)
             if source.colorchecker == 0.0:
                 return leaves, dead_leaves.reflectances()
             card = colorchecker.card_of_height(source.colorchecker, frame)
             return LeavesWithColorChecker(leaves, card), colorchecker.reflectances()
         case charts.StepWedge():
-            return step_wedge.step_wedge(source.steps, source.density_range, frame), gray
+            from vcam_cli.scenes.charts.step_wedge import step_wedge
+
+            return step_wedge(source.steps, source.density_range, frame), gray
         case charts.SiemensStar():
-            return siemens_star.SiemensStar(source.spokes, source.contrast), gray
+            from vcam_cli.scenes.charts.siemens_star import SiemensStar
+
+            return SiemensStar(source.spokes, source.contrast), gray
         case charts.PointGrid():
+            from vcam_cli.scenes.charts.point_grid import PointGrid
+
             return PointGrid(source.spacing, source.diameter), gray
         case charts.EyeChart():
-            return eye_chart.eye_chart(source.rows, frame), gray
+            from vcam_cli.scenes.charts.eye_chart import eye_chart
+
+            return eye_chart(source.rows, frame), gray
         case charts.HdrPatches():
-            return hdr_patches.hdr_patches(
-                source.patches, source.dynamic_range, source.lamp, frame
-            ), gray
+            from vcam_cli.scenes.charts.hdr_patches import hdr_patches
+
+            return (
+                hdr_patches(source.patches, source.dynamic_range, source.lamp, frame),
+                gray,
+            )
     raise bad(SOURCE, "this source is not supported yet", "use another chart, or an image")
 
 

@@ -29,9 +29,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.optics import FocusWindow
 from vcam_cli.errors import BadInput, bad
-from vcam_cli.image_formation.half_images import sites
 from vcam_cli.progress import Stages
-from vcam_cli.quality.disparity import disparity
 from vcam_cli.simulation.cost_model import light_seconds
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.solve.solved import Solved
@@ -211,6 +209,8 @@ def phase_disparity(ready: Prepared, window: FocusWindow) -> float | None:
     if ready.halves is None or phase is None:
         return None
     if phase.masked is not None:
+        from vcam_cli.image_formation.half_images import sites
+
         left, right = (half[at] for half, at in zip(ready.halves, sites(phase.masked), strict=True))
         apart, offset = 2 * phase.masked.period[1], 0.5  # right pixels lie half a step beside left
     else:
@@ -224,6 +224,8 @@ def phase_disparity(ready: Prepared, window: FocusWindow) -> float | None:
     level = seen[0].mean() + seen[1].mean()
     if level <= 0:
         return None
+    from vcam_cli.quality.disparity import disparity
+
     found = disparity(seen[0], seen[1], MOST, (LEAST_DETAIL * level) ** 2)
     inside = found[:, across.start - wider.start :][:, : across.stop - across.start]
     told = inside[np.isfinite(inside)]

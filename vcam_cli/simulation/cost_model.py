@@ -17,10 +17,7 @@ from vcam_cli.effects.signal_chain import ElectronEffect, Quantizer
 from vcam_cli.image_formation.estimates.light_cost import image_seconds
 from vcam_cli.image_formation.optical_path import SpectrumReport
 from vcam_cli.image_formation.transfer_functions import Band
-from vcam_cli.quality.display import display_screen
-from vcam_cli.quality.scielab import places_per_pixel
 from vcam_cli.readout.layout import Layout
-from vcam_cli.scheduling.estimators import PASSES
 from vcam_cli.simulation.plan import Plan
 from vcam_cli.solve.solved import Solved
 
@@ -102,6 +99,9 @@ def _places(camera: Solved) -> int:
     """Return at how many places of a pixel the metrics look."""
     if "s-cielab" not in camera.quality:
         return 1
+    from vcam_cli.quality.display import display_screen
+    from vcam_cli.quality.scielab import places_per_pixel
+
     screen = display_screen(camera.display, camera.layout.geometry.columns)
     return places_per_pixel(screen, camera.display.filters)
 
@@ -124,6 +124,8 @@ def sample_seconds(camera: Solved, effects: Sequence[Effect]) -> float:
     count = camera.exposure.count
     if not count:
         return 0.0
+    from vcam_cli.scheduling.estimators import PASSES
+
     repeated = of_kind(effects, ElectronEffect, Quantizer)
     again = sum(e.pixel_seconds for e in repeated)
     passes = PASSES if camera.exposure.estimator == "weighted" else 1

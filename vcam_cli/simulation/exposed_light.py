@@ -16,7 +16,7 @@ from vcam_cli.effects.pixel_signal import ColumnSpread, NeighborSharing, Tempora
 from vcam_cli.effects.signal_chain import Limit, NoiseSource, extreme_signal
 from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.floats import rms
-from vcam_cli.image_formation import half_images, photon_rate, pixelwise, timed_gains
+from vcam_cli.image_formation import photon_rate, pixelwise, timed_gains
 from vcam_cli.image_formation.light_plan import PERCENTILES, LightPlan
 from vcam_cli.image_formation.neighbor_sharing import Sharing, array_sharing
 from vcam_cli.readout import auto_exposure, exposure, sample_times
@@ -132,6 +132,8 @@ def expose(seen: SceneLight, light: photon_rate.Rate, is_planned: bool = True) -
     steps = pairwise((0.0, *times)) if timed or moving else ()
     halves, memory = None, 0
     if (phase := solved.pixel.phase_detection) is not None:
+        from vcam_cli.image_formation import half_images
+
         whole, defocus = light.plan.reduced(path), solved.geometry.focus_shift
         radius = (solved.optics.defocus + defocus) / (2 * solved.geometry.working_f_number)
 

@@ -19,8 +19,6 @@ from vcam_cli.arrays import Array
 from vcam_cli.effects.signal_chain import NoiseSource
 from vcam_cli.physics import readout
 from vcam_cli.processing.tone_map import sensor_white
-from vcam_cli.quality import mtf
-from vcam_cli.scheduling import estimators
 from vcam_cli.simulation.frame import Frame
 from vcam_cli.simulation.pixel_figures import pixel_figures
 
@@ -79,6 +77,8 @@ def _sample_figures(
     first, last = min(frame.times), max(frame.times)
     floor = sum(x.variance(0.0) for x in draws)
     if frame.solved.exposure.estimator == "weighted" and not frame.solved.exposure.bracket:
+        from vcam_cli.scheduling import estimators
+
         read = sum(x.variance(0.0) for x in draws if x.sample_draws == "independent")
         noise = estimators.weighted_variance(0.0, frame.times, dark / last, read, floor - read)
         floor = float(noise) * last**2 - dark
@@ -184,6 +184,8 @@ def edge_mtf50(frame: Frame) -> float:
         Frequency [cycles/pixel]; nan where no edge is found, inf where the MTF stays above one
         half.
     """
+    from vcam_cli.quality import mtf
+
     layout, plane = frame.layout, frame.picture_dn
     if layout.full_color:
         plane = plane[int(frame.white_rate.argmax())]

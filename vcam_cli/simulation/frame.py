@@ -17,16 +17,10 @@ from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.pixel_signal import Gain
 from vcam_cli.errors import CannotDo
 from vcam_cli.floats import own_float_errors
-from vcam_cli.image_formation import half_images, warps
+from vcam_cli.image_formation import warps
 from vcam_cli.image_formation.pixel_response import axis_levels
 from vcam_cli.progress import Stages
-from vcam_cli.readout import (
-    binned_readout,
-    device_capture,
-    exposure,
-    nondestructive_samples,
-    several_readouts,
-)
+from vcam_cli.readout import binned_readout, exposure
 from vcam_cli.readout.layout import Layout
 from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.layered import LayeredScene
@@ -97,6 +91,8 @@ class Frame(Prepared):
             phase = self.solved.pixel.phase_detection
             if phase is None or phase.masked is None:
                 return self.dn
+            from vcam_cli.image_formation import half_images
+
             return half_images.unmasked(self.dn, phase.masked, len(self.mosaic.block[0]))
         return self._unclipped_codes(self.photocurrent)
 
@@ -264,6 +260,8 @@ def _phase_codes(
     if ready.halves is None or phase is None:
         return None
     if phase.masked is not None:
+        from vcam_cli.image_formation import half_images
+
         of_left, of_right = half_images.sites(phase.masked)
         return dn[of_left], dn[of_right]
     time, active = ready.exposure_time, ready.plan.active
@@ -311,6 +309,8 @@ def take_frame(
         known = {field.name: getattr(ready, field.name) for field in fields(ready)}
         times, coarse = ready.times, ready.settings.coarse_normals
         if ready.chain.merge is not None:
+            from vcam_cli.readout import several_readouts
+
             several = several_readouts.capture(
                 *(ready.rate, ready.exposure_time, ready.chain, seeds, workers, coarse)
             )
@@ -324,6 +324,8 @@ def take_frame(
                 "pedestal": pedestal(ready.electrical, ready.layout, ready.rate.dtype),
             }
             if device is not None and on_device:
+                from vcam_cli.readout import device_capture
+
                 take = partial(device_capture.capture, device=device, **shared)
                 known |= {"device": device.describe()}
             else:
@@ -336,6 +338,8 @@ def take_frame(
             return Frame(
                 **known, electrons=electrons, dn=dn, phase_dn=_phase_codes(ready, dn, take)
             )
+        from vcam_cli.readout import nondestructive_samples
+
         electrons, dn = nondestructive_samples.samples(
             *(ready.rate, times, active, adc, seeds, workers),
             step_rates=ready.step_rates,

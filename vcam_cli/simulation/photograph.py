@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,13 +16,14 @@ from vcam_cli.camera.processing_steps import Step
 from vcam_cli.floats import own_float_errors
 from vcam_cli.processing import ProcessedPicture
 from vcam_cli.progress import Stages
-from vcam_cli.quality import display
 from vcam_cli.quality.metrics import Metrics
 from vcam_cli.quality.mse import mse, psnr_db
-from vcam_cli.quality.scielab import cielab_map, s_cielab_map
 from vcam_cli.simulation.figures import figures
 from vcam_cli.simulation.frame import Frame
 from vcam_cli.solve.solved import Solved
+
+if TYPE_CHECKING:  # what a user's eye sees is imported where `quality` asks for it
+    from vcam_cli.quality.display import Screen
 
 
 @dataclass(frozen=True)
@@ -215,14 +217,18 @@ class Photograph:
     @own_float_errors
     def s_cielab(self) -> Array:
         """S-CIELAB Delta E of the render from the ideal image on the camera's `display`."""
+        from vcam_cli.quality.scielab import s_cielab_map
+
         image, ideal, screen = self.linear, self.ideal, self._screen
         with self.stages("quality"):
             filters = self.frame.solved.display.filters
             return s_cielab_map(image, ideal, screen, filters, workers=self.workers)
 
     @property
-    def _screen(self) -> display.Screen:
-        return display.display_screen(self.frame.solved.display, self.frame.layout.picture_shape[1])
+    def _screen(self) -> Screen:
+        from vcam_cli.quality.display import display_screen
+
+        return display_screen(self.frame.solved.display, self.frame.layout.picture_shape[1])
 
     @cached_property
     @own_float_errors
@@ -235,6 +241,8 @@ class Photograph:
                 error = mse(image, ideal)
                 out += [("mse", error, ""), ("psnr_db", psnr_db(image, ideal), "dB")]
         if "cielab" in self.frame.solved.quality:
+            from vcam_cli.quality.scielab import cielab_map
+
             image, ideal = self.linear, self.ideal
             with self.stages("quality"):
                 each = cielab_map(image, ideal, self._screen, workers=self.workers)

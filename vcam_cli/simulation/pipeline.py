@@ -32,7 +32,6 @@ from vcam_cli.effects.pixel_signal import Gain
 from vcam_cli.effects.shading import ArrayShading
 from vcam_cli.processing import Context, Patches, ProcessedPicture, process
 from vcam_cli.simulation import autofocus, cost_model
-from vcam_cli.simulation.bracket import bracket_cameras, bracket_note, longest_of, merged_bracket
 from vcam_cli.simulation.coarse_light import coarse_camera, estimated_light
 from vcam_cli.simulation.exposed_light import expose
 from vcam_cli.simulation.frame import Frame, take_frame
@@ -77,6 +76,8 @@ def prepare(
     """
     of_bracket: tuple[str, ...] = ()
     if camera.exposure.bracket:
+        from vcam_cli.simulation.bracket import bracket_cameras, bracket_note, longest_of
+
         of_bracket = (bracket_note(camera.exposure),)
         camera = bracket_cameras(camera)[longest_of(camera)]
     solved, picture, notes = read_camera(camera, run.stages, shared)
@@ -179,6 +180,8 @@ def _take_bracket(camera: Camera, run: Run, shared: Shared) -> tuple[Frame, tupl
 
     Each is a frame of its own: with noise of its own, and with what has moved on meanwhile.
     """
+    from vcam_cli.simulation.bracket import bracket_cameras, longest_of, merged_bracket
+
     taken = []
     for single in bracket_cameras(camera):
         ready, notes = prepare(single, run, shared)

@@ -21,8 +21,6 @@ from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.pixel_response import scene_transfer
 from vcam_cli.image_formation.rate_cache import RateCache
 from vcam_cli.image_formation.transfer_functions import Transfer
-from vcam_cli.quality import scielab
-from vcam_cli.quality.display import display_screen
 from vcam_cli.readout import auto_exposure, exposure
 from vcam_cli.scenes.base import ChartScene, HarmonicScene, SampledScene
 from vcam_cli.scenes.depth_scene import DepthScene
@@ -373,6 +371,9 @@ def _require_memory(solved: Solved) -> int:
     scattered = array.rows * array.columns if layout.is_scattered else 0
     on_screen = 0
     if "s-cielab" in solved.quality:
+        from vcam_cli.quality import scielab
+        from vcam_cli.quality.display import display_screen
+
         shape = layout.picture_shape
         screen = display_screen(solved.display, shape[1])
         # By one thread, which is all there are where memory is little.

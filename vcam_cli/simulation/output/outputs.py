@@ -3,6 +3,8 @@
 Of several samples of one integration also captures/raw_001.exr and so on, and hdr.exr. Raw files
 are written by a thread while metrics and render are computed, and the render while raw files are
 still being written; files are most of a frame's cost.
+
+What few runs write is imported where it is written.
 """
 
 from __future__ import annotations
@@ -22,19 +24,16 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.files import atomic
 from vcam_cli.files.folder import OutputFolder
 from vcam_cli.files.images.exr import ExrWriter
-from vcam_cli.files.images.maps import write_map
 from vcam_cli.files.images.png import write_png
 from vcam_cli.files.images.rows import Attribute
 from vcam_cli.files.report import hash_file, hash_text, to_json
-from vcam_cli.files.spectral.exr import RADIANCE, WHITE, write_spectral
 from vcam_cli.files.tables import write_metrics
 from vcam_cli.memory import peak_memory
 from vcam_cli.parallel import ThreadPool
 from vcam_cli.processing.color_correction import CHROMATICITIES
-from vcam_cli.simulation import scene_radiance, spectral_irradiance
 from vcam_cli.simulation.figures import exposure_report
 from vcam_cli.simulation.frame import Frame
-from vcam_cli.simulation.output import isetcam_files, phase_files, provenance, raw_dng, raw_file
+from vcam_cli.simulation.output import provenance, raw_file
 from vcam_cli.simulation.output.provenance import versions
 from vcam_cli.simulation.output.raw_file import ROWS_AT_ONCE
 from vcam_cli.simulation.photograph import Photograph
@@ -145,6 +144,8 @@ def write(result: Photograph, folder: OutputFolder) -> None:
             if camera.quality:
                 jobs.append(pool.submit(lambda: _ideal(result, folder.new("ideal.exr"))))
             if "s-cielab" in camera.quality:
+                from vcam_cli.files.images.maps import write_map
+
                 jobs.append(
                     pool.submit(lambda: write_map(folder.new("delta_e.png"), result.s_cielab))
                 )
@@ -165,6 +166,8 @@ def write(result: Photograph, folder: OutputFolder) -> None:
         with result.stages("radiance"):
             _radiance(result, folder.new("radiance.exr"))
     if camera.output.isetcam:
+        from vcam_cli.simulation.output import isetcam_files
+
         with result.stages("isetcam"):
             watch = result.stages.watch
             isetcam_files.write_isetcam(folder.new, result.frame, result.workers, watch.step)
@@ -202,6 +205,9 @@ _SAMPLING = {
 
 def _irradiance(result: Photograph, path: Path) -> None:
     """Spectral irradiance on the sensor, computed and written wavelength by wavelength."""
+    from vcam_cli.files.spectral.exr import write_spectral
+    from vcam_cli.simulation import spectral_irradiance
+
     frame = result.frame
     nodes = spectral_irradiance.nodes(frame)
 
@@ -225,6 +231,9 @@ def _irradiance(result: Photograph, path: Path) -> None:
 
 def _radiance(result: Photograph, path: Path) -> None:
     """Write the radiance of the scene, wavelength by wavelength, and how it is a scene again."""
+    from vcam_cli.files.spectral.exr import RADIANCE, WHITE, write_spectral
+    from vcam_cli.simulation import scene_radiance
+
     frame = result.frame
     nodes, scene = scene_radiance.nodes(frame), scene_radiance.sampled_scene(frame)
 
@@ -271,9 +280,13 @@ def _raw_jobs(result: Photograph, folder: OutputFolder) -> Iterator[Callable[[],
     frame = result.frame
     said = config_hash(frame.camera)
     if frame.phase_dn is not None and frame.solved.output.phase:
+        from vcam_cli.simulation.output import phase_files
+
         yield partial(phase_files.write_phase, folder.new("phase.exr"), frame, said)
         yield partial(phase_files.write_disparity, folder.new("disparity.png"), frame)
     if frame.solved.output.dng:
+        from vcam_cli.simulation.output import raw_dng
+
         description = raw_file.description(frame, said)
         yield partial(raw_dng.write_raw_dng, folder.new("raw.dng"), frame, description)
     if frame.solved.output.tiff:

@@ -16,7 +16,6 @@ from vcam_cli.camera.derived.named_spectra import spectra
 from vcam_cli.camera.step_plugins import origin, registered
 from vcam_cli.config import shipped
 from vcam_cli.config.file_format import names_file
-from vcam_cli.files.spectral.hyperspectral import companions
 from vcam_cli.source_code import code_hash
 
 
@@ -72,6 +71,8 @@ def data_files(camera: Camera, form: dict[str, Any] | None = None) -> tuple[Path
     )
     found = {*describe(form), *shipped_spectra}
     if camera.scene.source.kind == "hyperspectral":
+        from vcam_cli.files.spectral.hyperspectral import companions
+
         found |= {str(path) for path in companions(camera.scene.source.file)}
     return tuple(Path(name) for name in sorted(found))
 
