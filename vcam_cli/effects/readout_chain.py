@@ -16,9 +16,6 @@ from vcam_cli.camera.derived.electrical import Circuit, Electrical, circuit, ful
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.derived.readouts import has_several
 from vcam_cli.camera.sensor.adc import Companding
-from vcam_cli.effects.base import of_kind
-from vcam_cli.effects.noise.sources import SOURCES
-from vcam_cli.effects.signal_chain import NoiseSource
 from vcam_cli.errors import bad, split
 
 SIGMAS = 4.0
@@ -50,6 +47,10 @@ def dark_noise(camera: Camera) -> float:
     BadInput
         Where the file contradicts itself.
     """
+    from vcam_cli.effects.base import of_kind
+    from vcam_cli.effects.noise.sources import SOURCES
+    from vcam_cli.effects.signal_chain import NoiseSource
+
     solved = geometry(camera)
     found = (kind.from_camera(camera, solved) for kind in SOURCES)
     sources = of_kind((source for source in found if source is not None), NoiseSource)

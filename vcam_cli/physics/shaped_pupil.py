@@ -23,7 +23,6 @@ from functools import lru_cache
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.parallel import product
 from vcam_cli.physics import diffraction
 
 FEWEST, MOST = 128, 640
@@ -202,6 +201,8 @@ def otf_grid(pupil: Mask, waves: Array, order: int, farthest: float = 2.0) -> Ot
     OtfGrid
         The OTF over lags in half frames.
     """
+    from vcam_cli.parallel import product  # threads, which a camera file's check does not need
+
     vander = np.polynomial.legendre.legvander(places(pupil), order)
     turns = product(vander @ tensor(waves, order).T, np.ascontiguousarray(vander.T))
     return grid_of_paths(pupil, turns, farthest)

@@ -38,8 +38,13 @@ TEMPERATURES = (77.0, 400.0)
 # Below this product of depth and 1 / length an integral is smooth enough for Gauss's rule, and the
 # closed form loses digits. 12 points: exp(-2 t) sinh(2 (1 - t)) is integrated to 1e-19.
 _THIN_LAYER = 2.0
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
-_NODES, _WEIGHTS = (_NODES + 1) / 2, _WEIGHTS / 2
+
+
+@cache
+def _gauss() -> tuple[Floats, Floats]:
+    """Return nodes and weights on 0 to 1; most commands need none."""
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    return (nodes + 1) / 2, weights / 2
 
 
 def _float(value: ArrayLike) -> Floats:
@@ -207,8 +212,9 @@ def _neutral_region_by_quadrature(a: Floats, k: Floats, depth: Floats) -> Floats
     """Return the part of the light entering the neutral region that is collected, by quadrature."""
     r, t = (k * depth)[:, None], (a * depth)[:, None]
     r = np.maximum(r, 1e-150)  # where nothing recombines the ratio is 1 - node
-    values = np.exp(-t * _NODES) * np.sinh(r * (1 - _NODES)) / np.sinh(r)
-    return np.asarray(t[:, 0] * (values @ _WEIGHTS))
+    nodes, weights = _gauss()
+    values = np.exp(-t * nodes) * np.sinh(r * (1 - nodes)) / np.sinh(r)
+    return np.asarray(t[:, 0] * (values @ weights))
 
 
 def _neutral_region_closed_form(a: Floats, k: Floats, depth: Floats) -> Floats:

@@ -23,8 +23,7 @@ from vcam_cli.camera.scene.scene_files import Crop
 from vcam_cli.camera.scene.sources import Layers
 from vcam_cli.camera.sensor.array import Positions
 from vcam_cli.effects import readout_chain
-from vcam_cli.effects.noise import fpn_maps
-from vcam_cli.effects.optics import aberration, point_spread
+from vcam_cli.effects.optics import lens_check
 from vcam_cli.errors import bad, split
 from vcam_cli.solve.layout import camera_layout
 
@@ -298,7 +297,7 @@ def read_lens(camera: Camera) -> dict[str, Array]:
     BadInput
         For a wavefront too steep, or an unreadable point spread function.
     """
-    aberration.check(camera, geometry(camera))
+    lens_check.check(camera, geometry(camera))
     for number, alone in enumerate(layer_cameras(camera)):
         from vcam_cli.simulation.scene_files import check_blur
 
@@ -306,10 +305,11 @@ def read_lens(camera: Camera) -> dict[str, Array]:
     psf = camera.optics.psf
     if psf is None:
         return {}
+    from vcam_cli.effects.optics.point_spread import PSF
     from vcam_cli.files.images.psf import read_psf
 
     channels = max(len(psf.wavelengths), 1)
-    return {point_spread.PSF: read_psf(psf.file, channels, (*split(point_spread.PSF), "file"))}
+    return {PSF: read_psf(psf.file, channels, (*split(PSF), "file"))}
 
 
 def check_maps(camera: Camera) -> None:
@@ -348,13 +348,15 @@ def read_maps(camera: Camera) -> dict[str, Array]:
         or negative gains or dark currents.
     """
     fpn = camera.pixel.fpn
-    files = dict(zip(fpn_maps.MAPS, (fpn.offset_map, fpn.gain_map, fpn.dark_map), strict=True))
-    found = {}
-    for key, file in files.items():
-        if file is not None:
-            from vcam_cli.files.images.scene_maps import read_pixels
+    files = fpn.offset_map, fpn.gain_map, fpn.dark_map
+    if not any(files):
+        return {}
+    from vcam_cli.effects.noise import fpn_maps
+    from vcam_cli.files.images.scene_maps import read_pixels
 
-            g = geometry(camera)
+    found, g = {}, geometry(camera)
+    for key, file in zip(fpn_maps.MAPS, files, strict=True):
+        if file is not None:
             found[key] = read_pixels(file, split(key), (g.rows, g.columns), key != fpn_maps.OFFSET)
     return found
 

@@ -14,7 +14,7 @@ from vcam_cli.camera.derived.scene_layers import DEPTH, PATH, camera_at
 from vcam_cli.camera.scene.scene_files import DepthMap, Hyperspectral, ImageFile
 from vcam_cli.camera.scene.sources import Layers
 from vcam_cli.effects.base import Effect, of_kind
-from vcam_cli.effects.optics import aberration
+from vcam_cli.effects.optics import lens_check
 from vcam_cli.effects.optics.depth import Depth
 from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.errors import BadInput, bad
@@ -156,7 +156,7 @@ def check_blur(alone: Camera, path: tuple[str | int, ...]) -> None:
         For such a distance.
     """
     try:
-        aberration.check(alone, geometry(alone))
+        lens_check.check(alone, geometry(alone))
     except BadInput as error:
         [problem] = error.problems
         message = f"what lies at {alone.scene.distance:.6g} m {problem.message}"
