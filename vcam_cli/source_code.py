@@ -82,5 +82,7 @@ def _hash(package: Path, files: State) -> str:
     whole = hashlib.sha256()
     for name, size, _ in files:
         whole.update(f"{name}\0{size}\0".encode())
-        whole.update((package / name).read_bytes())
+        # Unbuffered, and without a Path for each: half the time of the hash.
+        with open(f"{package}{os.sep}{name}", "rb", buffering=0) as file:
+            whole.update(file.read())
     return whole.hexdigest()[:16]

@@ -169,11 +169,12 @@ def parse_numbers(file: Path, line: int, cells: list[str]) -> list[float]:
     ValueError
         Something is no finite number.
     """
-    shown = ",".join(cells)
     try:
         values = [float(cell) for cell in cells]
     except ValueError:
+        shown = ",".join(cells)
         raise ValueError(f"{file}:{line}: {shown!r} is not a row of numbers") from None
-    if not all(math.isfinite(value) for value in values):
+    if not all(map(math.isfinite, values)):
+        shown = ",".join(cells)
         raise ValueError(f"{file}:{line}: {shown!r} holds a value that is not finite")
     return values
