@@ -10,7 +10,7 @@
 - Everything else: the cosine spectrum, multiplied by the transfer function and folded onto the
   pixels, as finely as the tolerance asks (`bandwidth.py`, `chart_cells.py`).
 
-A way that few scenes go is imported where it is gone.
+Methods that few scenes need are imported where they are chosen.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ from vcam_cli.simulation.figures import figures
 from vcam_cli.simulation.frame import Frame
 from vcam_cli.solve.solved import Solved
 
-if TYPE_CHECKING:  # what a user's eye sees is imported where `quality` asks for it
+if TYPE_CHECKING:  # a display is imported where a metric needs one
     from vcam_cli.quality.display import Screen
 
 
