@@ -18,7 +18,7 @@ from scipy.special import sici
 from vcam_cli import simulate
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.effects.base import SignalLevels
-from vcam_cli.effects.optics import aberration
+from vcam_cli.effects.optics import lens_check
 from vcam_cli.effects.optics.aberration import Aberration
 from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.effects.optics.field_blur import TYPICAL_CHANGE, FieldBlur, ZoneWeight
@@ -477,13 +477,13 @@ def test_too_steep_for_waves_is_refused_when_switched_off_too(tmp_path):
     steep = {"optics.zernike": {8: "50 um"}, "effects": {"aberration": "off"}}
     c = camera(tmp_path, steep)
     with pytest.raises(BadInput, match="at most 200 can be followed"):
-        aberration.check(c, geometry(c))
+        lens_check.check(c, geometry(c))
 
 
 def test_too_steep_for_waves_is_no_mistake_for_rays(tmp_path):
     steep = {"optics.zernike": {8: "50 um"}, "optics.diffraction": False}
     c = camera(tmp_path, steep)
-    aberration.check(c, geometry(c))
+    lens_check.check(c, geometry(c))
     c = camera(tmp_path, {"optics.zernike": {8: "50 um"}})
     with pytest.raises(BadInput, match="pupil radius"):
         simulate(c)
