@@ -62,6 +62,7 @@ from vcam_cli.image_formation.harmonic_scenes import (
     wave_layers,
 )
 from vcam_cli.image_formation.optical_path import Layer, Layers, OpticalPath, SpectrumReport
+from vcam_cli.image_formation.profile_scenes import profile_layers
 from vcam_cli.image_formation.sub_exposures import sub_exposed_layers, sub_exposed_motion
 from vcam_cli.image_formation.transfer_tables import Tables, mixtures, tabulate
 from vcam_cli.physics.cache import remembered
@@ -126,10 +127,9 @@ def image_layers(path: OpticalPath, scene: AnyScene) -> tuple[Layers, SpectrumRe
         scene = scene.chart
     if not path.transfer.effects and not path.field and path.averages_over_box:
         return _mean_layers(path, scene)
-    if isinstance(scene, ChartScene) and (profile := scene.chart.profile()) is not None:
-        from vcam_cli.image_formation.profile_scenes import profile_layers
-
-        found = profile_layers(path, profile)
+    if isinstance(scene, ChartScene) and not path.has_opacity:
+        profile = scene.chart.profile()
+        found = None if profile is None else profile_layers(path, profile)
         if found is not None:
             return found
     if (spot := _fine_spot(path, scene)) is not None:

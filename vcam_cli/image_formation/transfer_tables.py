@@ -636,7 +636,7 @@ def mixtures(
     every = np.eye(components)
     most = components if size.rank is None else size.rank
     if components <= min(max(colors, 3), most):
-        return every, 0.0
+        return every[exact.weights.any(axis=(1, 2))], 0.0
     table = np.concatenate([*_samples(exact, size.top), *more()], axis=1)
     peak, mix, error = np.abs(exact.level).max() or 1.0, every[:0], 0.0
     for part in _separate_groups(exact.weights) if size.rank is None else [np.arange(components)]:

@@ -75,21 +75,19 @@ def _layer(placed: PlacedLayer, view: View) -> Layer:
         assert files.picture is not None
         picture, frame = files.picture, _picture_frame(files.picture, own)
         spectra = picture_spectra(placed.scene, source.model, picture)
-        mask = files.mask
-        if mask is None or mask.shape == picture.shape[:2]:
-            whole = np.ones((*picture.shape[:2], picture.shape[2] + 1), picture.dtype)
-            whole[..., :-1] = picture
-            if mask is not None:
-                whole *= mask[..., None]
+        if files.mask is not None and files.mask.shape == picture.shape[:2]:
+            whole = np.empty((*picture.shape[:2], picture.shape[2] + 1), picture.dtype)
+            whole[..., :-1], whole[..., -1] = picture, 1
+            whole *= files.mask[..., None]
             masked = PictureChart(whole, frame, mirrored=fills)
             brightest = float(picture.max(initial=0.0))
             return Layer(masked, spectra, placed.center, None if fills else frame, brightest)
         chart: Chart = PictureChart(picture, frame, mirrored=True)
     else:
-        mask = np.ones((1, 1), np.float32) if files.mask is None else files.mask
         chart, reflectances = chart_and_reflectances(source, own)
         white = light.white_radiance(placed.scene)
         spectra = tuple(white.multiply(reflectance) for reflectance in reflectances)
+    mask = np.ones((1, 1), np.float32) if files.mask is None else files.mask
     opacity = PictureChart(mask[..., None], frame, mirrored=fills)
     size = None if fills else frame
     return Layer(MaskedChart(chart, opacity), spectra, placed.center, size, chart.brightest)

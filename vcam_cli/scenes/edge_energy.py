@@ -7,6 +7,7 @@ not.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -131,6 +132,8 @@ def counted_height(first: Array, second: Array, ceiling: float) -> Array:
     ceiling : float
         Light that fills a pixel.
     """
+    if math.isinf(ceiling):
+        return np.asarray(np.square(first - second))
     height = np.abs(first - second)
     counts = np.minimum(first, second) < ceiling + RINGING * height
     return np.where(counts, np.square(height), 0.0)

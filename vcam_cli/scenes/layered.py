@@ -15,6 +15,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.parallel import pieces
 from vcam_cli.scenes.base import Chart, ChartScene, Frame, PaintedCells, Scene, View
 from vcam_cli.scenes.cells import means_of_parts, window_extremes
+from vcam_cli.scenes.closed_form import Profile
 from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, total_energy
 from vcam_cli.scenes.framed import chart_scene
@@ -55,6 +56,12 @@ class MaskedChart(Chart):
     def brightest(self) -> float:
         """Brightest light, relative to the perfect white."""
         return self.light.brightest
+
+    @property
+    def covers_all(self) -> bool:
+        """Whether nothing is seen behind it, wherever."""
+        opacity = self.opacity
+        return opacity.mirrored and opacity.is_even and bool(opacity.picture[0, 0, 0] == 1)
 
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
         """Write the averages over the cells: exact, since samples of opacity divide them."""
@@ -99,7 +106,11 @@ class MaskedChart(Chart):
 
     def sample_borders(self, x_edges: Array, y_edges: Array) -> tuple[Array, Array]:
         """Return where light or opacity may change within cells."""
-        both = (chart.sample_borders(x_edges, y_edges) for chart in (self.light, self.opacity))
+        own = self.opacity.sample_borders(x_edges, y_edges)
+        (_, across, x), (_, down, y) = self.opacity.inside(x_edges, y_edges)
+        if not len(across) or not len(down):
+            return own
+        both = self.light.sample_borders(x, y), own
         x, y = (np.concatenate(places) for places in zip(*both, strict=True))
         return x, y
 
@@ -182,6 +193,15 @@ class LayerChart(Chart):
         if inner is None:
             return None
         return inner[0] + self.center[0], inner[1] + self.center[1]
+
+    def profile(self) -> Profile | None:
+        """Return the light of parallel straight edges that covers all, in its place; else None."""
+        layer = self.layer
+        found = layer.light.profile() if isinstance(layer, MaskedChart) else None
+        if found is None or not layer.covers_all:
+            return None
+        moved = np.dot(found.across, self.center)
+        return replace(found, places=found.places + moved)
 
     def crop_to_cells(self, x_edges: Array, y_edges: Array) -> "LayerChart":
         """Return the same layer as a chart that may be faster on these cells."""
