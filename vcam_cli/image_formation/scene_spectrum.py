@@ -160,6 +160,38 @@ class SampledSpectrum:
 
 
 @dataclass(frozen=True, eq=False)
+class JoinedSpectrum:
+    """The planes of several spectra, no two of which any color sees together."""
+
+    parts: tuple[tuple[SceneSpectrum, int], ...]
+    """By plane: the spectrum that it is in, and its number there."""
+
+    @property
+    def dtype(self) -> np.dtype:
+        """Floating-point type of the coefficients."""
+        return self.parts[0][0].dtype
+
+    def __len__(self) -> int:
+        return len(self.parts)
+
+    def rows(self, plane: int, index: Index, count: int | None = None) -> Array:
+        """Return rows of a plane's coefficients (n, count), as `SceneSpectrum.rows`."""
+        spectrum, number = self.parts[plane]
+        return spectrum.rows(number, index, count)
+
+    def products(self, y: Array, x: Array, workers: int, of: Sequence[Pair] | None = None) -> Array:
+        """Return sums of products of two planes, as `SceneSpectrum.products`."""
+        every = of or pairs(len(self))
+        out = np.empty((len(every), len(y) - 1, len(x) - 1))
+        for spectrum in {id(part): part for part, _ in self.parts}.values():
+            own = [n for n, (r, _) in enumerate(every) if self.parts[r][0] is spectrum]
+            if own:
+                both = [(self.parts[every[n][0]][1], self.parts[every[n][1]][1]) for n in own]
+                out[own] = spectrum.products(y, x, workers, both)
+        return out
+
+
+@dataclass(frozen=True, eq=False)
 class DeviceSpectrum(SampledSpectrum):
     """The spectrum of planes of samples, on a device."""
 

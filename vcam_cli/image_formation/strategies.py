@@ -44,6 +44,7 @@ from vcam_cli.image_formation.estimates.bandwidth import (
 from vcam_cli.image_formation.estimates.chart_cells import ChosenCells, cell_grid, cells_per_pixel
 from vcam_cli.image_formation.estimates.effect_changes import changes_by_omission, needed_modes
 from vcam_cli.image_formation.estimates.scene_sampling import (
+    closed_planes,
     rounding_error,
     sampled_image,
     with_sufficient_precision,
@@ -237,7 +238,8 @@ def _spectral_layers(
         on_device = memory_model.device_bytes(path, scene, highest, len(mixing[0]))
         require(path.device, on_device, f"{g.rows} x {g.columns} pixels")
     least = max((part.nyquist(g) for part in rings), default=LOWEST)
-    needed = partial(memory_model.image_bytes, path, scene, highest, len(mixing[0]), rings)
+    sampled = int((~closed_planes(path, scene, mixing[0])).sum())
+    needed = partial(memory_model.image_bytes, path, scene, highest, sampled, rings)
     memory.require(needed(least), g.rows, g.columns)
     image = sampled_image(path, scene, highest, mixing, least)
     size = table_size(path, image.highest)

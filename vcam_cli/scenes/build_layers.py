@@ -82,7 +82,7 @@ def _layer(placed: PlacedLayer, view: View) -> Layer:
             masked = PictureChart(whole, frame, mirrored=fills)
             brightest = float(picture.max(initial=0.0))
             return Layer(masked, spectra, placed.center, None if fills else frame, brightest)
-        chart: Chart = PictureChart(picture, frame, mirrored=True)
+        chart: Chart = PictureChart(picture, frame, mirrored=fills)
     else:
         chart, reflectances = chart_and_reflectances(source, own)
         white = light.white_radiance(placed.scene)

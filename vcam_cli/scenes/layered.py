@@ -121,8 +121,14 @@ class MaskedChart(Chart):
 
     def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
         """Return the energy of the light's edges, and of the opacity's before the brightest."""
-        bright = self.light.brightest * float(np.abs(level[:-1]).max(initial=0.0)) + abs(level[-1])
         own = self.light.edge_energy(region, level[:-1], ceiling)
+        bright = float(abs(level[-1]))
+        if isinstance(self.light, PictureChart) and not self.light.mirrored:
+            if not bright:
+                return own  # its border is among its own edges
+            own, bright = own.scaled(2), math.sqrt(2) * bright  # (a + b)^2 <= 2 (a^2 + b^2)
+        else:
+            bright += self.light.brightest * float(np.abs(level[:-1]).max(initial=0.0))
         return own + self.opacity.edge_energy(region, np.ones(1), math.inf).scaled(bright**2)
 
     def edges(self) -> tuple[Array, Array] | None:
@@ -158,6 +164,14 @@ class LayerChart(Chart):
     def brightest(self) -> float:
         """Brightest light, relative to the perfect white; opacity is as bright as white."""
         return max(self.layer.brightest, 1.0)
+
+    @property
+    def even_opacity(self) -> "LayerChart | None":
+        """Its opacity alone, in closed form, where it is the same all over its frame; else None."""
+        layer = self.layer
+        if isinstance(layer, MaskedChart) and layer.opacity.edges() is not None:
+            return replace(self, layer=layer.opacity)
+        return None
 
     def opacity_ends(self, x_edges: Array, y_edges: Array) -> tuple[Array, Array]:
         """Return bounds on the least and the largest opacity in cells (rows, columns)."""

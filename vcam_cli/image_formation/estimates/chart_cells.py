@@ -27,8 +27,9 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.image_formation.estimates.lens_contrast import lens_contrast
 from vcam_cli.image_formation.optical_path import OpticalPath
-from vcam_cli.scenes.base import ChartScene
+from vcam_cli.scenes.base import ChartScene, SampledScene
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region
+from vcam_cli.scenes.layered import LayerChart
 
 CELLS_SHARE = 0.4
 """Part of the tolerance that cells may use."""
@@ -44,6 +45,28 @@ LEAST, MOST = 1.1, 256.0
 """Cells per pixel pitch, at least and at most."""
 FREQUENCIES = 24
 """Frequencies along each axis at which what is folded is summed."""
+
+
+def closed_opacity(path: OpticalPath, scene: SampledScene) -> LayerChart | None:
+    """Return the opacity of a painted layer that has a spectrum in closed form.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    scene : SampledScene
+        The scene.
+
+    Returns
+    -------
+    LayerChart or None
+        The rectangle that the layer covers evenly, whose edges no cells fold; None of others, and
+        where a device holds all planes.
+    """
+    if not path.has_opacity or path.device.whole or not isinstance(scene, ChartScene):
+        return None
+    chart = scene.chart
+    return chart.even_opacity if isinstance(chart, LayerChart) and scene.is_painted else None
 
 
 class ChosenCells(NamedTuple):
@@ -151,6 +174,9 @@ class CellError:
         """
         g = path.geometry
         level = path.judged_weights.sum(axis=1)
+        if closed_opacity(path, scene) is not None:  # cells hold the light alone
+            levels = path.transfer.level
+            level = levels[:, int(levels[:-1].sum(axis=0).argmax())]
         sizes = (
             (g.sensor_width + 2 * around * g.pitch_x, g.sensor_height + 2 * around * g.pitch_y)
             for around in AROUND

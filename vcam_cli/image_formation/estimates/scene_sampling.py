@@ -10,10 +10,11 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.image_formation.closed_spectrum import closed_spectrum
 from vcam_cli.image_formation.estimates.bandwidth import FREQUENCY_SHARE, LOWEST, axes, table_size
-from vcam_cli.image_formation.estimates.chart_cells import cell_grid
+from vcam_cli.image_formation.estimates.chart_cells import cell_grid, closed_opacity
 from vcam_cli.image_formation.estimates.power_spectrum import PowerSpectrum, power_spectrum
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.scene_spectrum import (
+    JoinedSpectrum,
     SceneSpectrum,
     copied_to,
     painted_on,
@@ -182,6 +183,26 @@ def sampled_image(
     )
 
 
+def closed_planes(path: OpticalPath, scene: SampledScene, mix: Array) -> Array:
+    """Return which mixtures (R,) of a painted chart have a spectrum in closed form.
+
+    They are the opacity of a layer that is the same all over its frame: a rectangle. Its edges fold
+    on no cells.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    scene : SampledScene
+        The scene.
+    mix : Array
+        Mixtures (R, K) of its components.
+    """
+    if closed_opacity(path, scene) is None:
+        return np.zeros(len(mix), bool)
+    return (mix[:, -1] != 0) & ~mix[:, :-1].any(axis=1)
+
+
 def _scene_spectrum(
     path: OpticalPath, scene: SampledScene, highest: float, mix: Array
 ) -> tuple[SampledScene, SceneSpectrum, float]:
@@ -202,8 +223,22 @@ def _scene_spectrum(
             )
             found = transform_on(path.device, cells, terms)
             return scene, found, float((level.T @ brightest).max())
-        painted, brightest = transform_painted(scene, mix, terms, dtype, path.workers)
-        return scene, painted, float((level.T @ brightest).max())
+        closed = closed_planes(path, scene, mix)
+        own, others = np.flatnonzero(~closed), np.flatnonzero(closed)
+        painted, brightest = transform_painted(scene, mix[own], terms, dtype, path.workers)
+        peak = float((level[own].T @ brightest).max())
+        if not len(others):
+            return scene, painted, peak
+        opacity = closed_opacity(path, scene)
+        assert opacity is not None
+        cover = replace(scene, chart=opacity, spectra=scene.spectra[-1:])
+        known = closed_spectrum(cover, mix[others, -1:], (y, x), dtype)
+        parts: list[tuple[SceneSpectrum, int]] = [(known, 0)] * len(mix)
+        for spectrum, numbers in ((painted, own), (known, others)):
+            for number, plane in enumerate(numbers):
+                parts[plane] = spectrum, number
+        bright = float((level[others].T @ np.abs(mix[others, -1])).max())
+        return scene, JoinedSpectrum(tuple(parts)), max(peak, bright)
     planes: Array = scene.planes(mix, path.workers).astype(dtype, copy=False)
     brightest = np.array([max(float(p.max()), -float(p.min())) for p in planes])
     peak = float((level.T @ brightest).max())
