@@ -192,8 +192,10 @@ class PowerSpectrum:
         for parity in tables.parities:
             values = _values(tables, parity, self.x, self.y, place)
             for (r, s), squares in zip(self.pairs, products, strict=True):
-                both = tables.is_seen[r] & tables.is_seen[s]
-                power[both] += values[r, both] * values[s, both] * squares
+                for color in np.flatnonzero(tables.is_seen[r] & tables.is_seen[s]):
+                    both = values[r, color] * values[s, color]
+                    both *= squares
+                    power[color] += both
         return np.maximum(power, 0)
 
     def upper_bound(self, tables: Tables) -> Array:
