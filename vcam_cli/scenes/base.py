@@ -23,7 +23,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.scenes.bands import bands_of_rows, paint_by_bands
 from vcam_cli.scenes.blur_change import BlurLoss, ChangeBounds, profile_bounds, rectangle_bounds
-from vcam_cli.scenes.cells import cell_edges, edges_within
+from vcam_cli.scenes.cells import Spans, cell_edges, edges_within, extremes_within
 from vcam_cli.scenes.closed_form import LightDisc, Products, Profile, Rectangles
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, counted_height, rectangle_energy
 from vcam_cli.scenes.waves import WaveScene
@@ -463,6 +463,28 @@ class Chart(ABC):
         """
         return self.values(x, y, mix)
 
+    def value_ends(self, x: Spans, y: Spans, mix: Array) -> tuple[Array, Array] | None:
+        """Return the least and the largest value in rectangles, of a chart that knows them.
+
+        Parameters
+        ----------
+        x, y : Spans
+            Where the rectangles begin and where they end, (n,) along x and (m,) along y [m].
+        mix : Array
+            Mixtures (R, K) of the components.
+
+        Returns
+        -------
+        low, high : Array
+            Values (R, m, n), in the unit of `mix`; None where the chart does not know them.
+        """
+        edges = self.edges()
+        if edges is None or self.discs(np.zeros((1, mix.shape[1]))):
+            return None
+        inside = [_between(e, *spans) for e, spans in zip(edges, (x, y), strict=True)]
+        values = self.even_values(inside[0][0], inside[1][0], mix)
+        return extremes_within(values, inside[1][1], inside[0][1])
+
     def discs(self, mix: Array) -> tuple[LightDisc, ...]:
         """Return the discs that lie on a chart of even rectangles, if it has any.
 
@@ -720,6 +742,15 @@ class ChartScene(SampledScene):
         for rows in bands_of_rows(len(y), len(x)):
             out[:, rows] = self.chart.values(x, y[rows], mix)
         return out
+
+
+def _between(edges: Array, first: Array, last: Array) -> tuple[Array, Spans]:
+    """Return a place between any two edges, before and behind all, and which spans have some."""
+    edges, every = np.unique(edges), np.concatenate([edges, first, last])
+    size = float(np.ptp(every))
+    every = np.concatenate([[every.min() - size], edges, [every.max() + size]])
+    middle = (every[1:] + every[:-1]) / 2
+    return middle, (np.searchsorted(edges, first, "right"), np.searchsorted(edges, last, "left"))
 
 
 Scene = WaveScene | HarmonicScene | SampledScene

@@ -4,6 +4,9 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 
+Spans = tuple[Array, Array]
+"""Where intervals begin, and where they end."""
+
 
 def cell_edges(count: int, pitch: float) -> Array:
     """Return the edges of cells centered on 0.
@@ -175,3 +178,32 @@ def window_extremes(pick: np.ufunc, plane: Array, size: tuple[int, int]) -> Arra
             )
             known += step
     return plane
+
+
+def extremes_within(values: Array, y: Spans, x: Spans) -> tuple[Array, Array]:
+    """Return the least and the largest of the values in rectangles of rows and columns.
+
+    Parameters
+    ----------
+    values : Array
+        Values (..., h, w).
+    y, x : Spans
+        First and last row (m,), and first and last column (n,), of each rectangle.
+
+    Returns
+    -------
+    low, high : Array
+        Values (..., m, n).
+    """
+    found = []
+    for pick in (np.minimum, np.maximum):
+        plane = values
+        for axis, spans in ((-2, y), (-1, x)):
+            pairs, places = np.unique(np.stack(spans), axis=1, return_inverse=True)
+            lines = [
+                pick.reduce(plane.take(range(first, last + 1), axis=axis), axis=axis)
+                for first, last in pairs.T.tolist()
+            ]
+            plane = np.stack(lines, axis=axis).take(places.ravel(), axis=axis)
+        found.append(plane)
+    return found[0], found[1]

@@ -14,7 +14,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.parallel import pieces
 from vcam_cli.scenes.base import Chart, ChartScene, Frame, PaintedCells, Scene, View
-from vcam_cli.scenes.cells import means_of_parts, window_extremes
+from vcam_cli.scenes.cells import Spans, means_of_parts, window_extremes
 from vcam_cli.scenes.closed_form import Profile
 from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, total_energy
@@ -56,12 +56,6 @@ class MaskedChart(Chart):
     def brightest(self) -> float:
         """Brightest light, relative to the perfect white."""
         return self.light.brightest
-
-    @property
-    def covers_all(self) -> bool:
-        """Whether nothing is seen behind it, wherever."""
-        opacity = self.opacity
-        return opacity.mirrored and opacity.is_even and bool(opacity.picture[0, 0, 0] == 1)
 
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
         """Write the averages over the cells: exact, since samples of opacity divide them."""
@@ -173,6 +167,24 @@ class LayerChart(Chart):
             return replace(self, layer=layer.opacity)
         return None
 
+    @property
+    def covers_frame(self) -> bool:
+        """Whether nothing is seen behind it, all over its frame."""
+        layer = self.layer
+        if not isinstance(layer, MaskedChart) or not layer.opacity.is_even:
+            return False
+        return bool(layer.opacity.picture[0, 0, 0] == 1)
+
+    def light_ends(self, x: Spans, y: Spans, mix: Array) -> tuple[Array, Array] | None:
+        """Return the least and the largest light in rectangles, as if all were opaque.
+
+        Parameters are those of `Chart.value_ends`, mixtures of the light alone.
+        """
+        if not isinstance(self.layer, MaskedChart):
+            return None
+        own = ((low - c, high - c) for (low, high), c in zip((x, y), self.center, strict=True))
+        return self.layer.light.value_ends(*own, mix)
+
     def opacity_ends(self, x_edges: Array, y_edges: Array) -> tuple[Array, Array]:
         """Return bounds on the least and the largest opacity in cells (rows, columns)."""
         x, y = x_edges - self.center[0], y_edges - self.center[1]
@@ -212,7 +224,7 @@ class LayerChart(Chart):
         """Return the light of parallel straight edges that covers all, in its place; else None."""
         layer = self.layer
         found = layer.light.profile() if isinstance(layer, MaskedChart) else None
-        if found is None or not layer.covers_all:
+        if found is None or not (layer.opacity.mirrored and self.covers_frame):
             return None
         moved = np.dot(found.across, self.center)
         return replace(found, places=found.places + moved)

@@ -2,12 +2,15 @@
 
 Of a pixel's rays that meet opacities from m to M, A in the mean, no more can be missing from the
 product of means than (M - m) A' (1 - A') of the brightest light behind, A' = (A - m) / (M - m):
-there each ray meets either m or M, and sees nothing or all of that light.
+there each ray meets either m or M, and sees nothing or all of that light. Where rays see light
+from l to h behind, that holds of the light beyond l: even light hides nothing, whatever is before
+it.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -18,8 +21,8 @@ from vcam_cli.effects.temporal.motion import EvenMotion
 from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.image_formation.layers.ray_cells import BORDER, Window
 from vcam_cli.image_formation.optical_path import LayerOptics
-from vcam_cli.scenes.cells import window_extremes
-from vcam_cli.scenes.layered import EVEN, LayerChart
+from vcam_cli.scenes.cells import Spans, window_extremes
+from vcam_cli.scenes.layered import EVEN, LayerChart, LayerPart
 
 
 def ray_reach(optics: LayerOptics) -> tuple[float, float]:
@@ -118,3 +121,79 @@ def _opacity_range(
     low, high = chart.opacity_ends(*edges)
     size = 2 * around[1] + 1, 2 * around[0] + 1
     return window_extremes(np.minimum, low, size), window_extremes(np.maximum, high, size)
+
+
+def spread_behind(
+    g: Geometry,
+    parts: Sequence[LayerPart],
+    optics: Sequence[LayerOptics],
+    level: Array,
+    beyond: float,
+    side: int,
+) -> list[Array]:
+    """Return how far apart lights are that rays of a pixel may see behind layers: a bound.
+
+    What is seen is a mean of the lights of layers, so it lies between the least and the largest of
+    them. A layer's light is not counted where it is beside all rays, nor that of those behind it
+    where it covers all.
+
+    Parameters
+    ----------
+    g : Geometry
+        Geometry of the array.
+    parts : sequence of LayerPart
+        The layers, the nearest first.
+    optics : sequence of LayerOptics
+        What acts on the light of each.
+    level : Array
+        Signal (K, C) of the scene's components, white the last one [e/s].
+    beyond : float
+        How far from a ray's place lens and silicon bring light, besides [m].
+    side : int
+        Side of a tile of pixels.
+
+    Returns
+    -------
+    list of Array
+        Of each layer but the last what there is behind it, by tile (m, n) in the color of most
+        [e/s].
+    """
+    spans = []
+    for at, pitch, count in zip(
+        pixel_centers(g, detector=True), (g.pitch_x, g.pitch_y), (g.columns, g.rows), strict=True
+    ):
+        first = np.arange(0, count, side)
+        spans.append((at[first] - pitch / 2, at[np.minimum(first + side, count) - 1] + pitch / 2))
+    shape = level.shape[1], len(spans[1][0]), len(spans[0][0])
+    low, high = np.zeros(shape), np.zeros(shape)
+    found: list[Array] = []
+    for part, own in reversed(list(zip(parts, optics, strict=True))):
+        found.append((high - low).max(axis=0))
+        around = [
+            (first - reach - beyond, last + reach + beyond)
+            for (first, last), reach in zip(spans, ray_reach(own), strict=True)
+        ]
+        ends = part.chart.light_ends(*around, level[part.components].T)
+        if ends is None:
+            most = part.brightest * level[-1][:, None, None]
+            ends = np.zeros(shape), np.broadcast_to(most, shape)
+        beside, within = _place_in(part, *around)
+        low = np.where(beside, low, np.where(within, ends[0], np.minimum(low, ends[0])))
+        high = np.where(beside, high, np.where(within, ends[1], np.maximum(high, ends[1])))
+    return found[:0:-1]
+
+
+def _place_in(part: LayerPart, x: Spans, y: Spans) -> tuple[Array, Array]:
+    """Return whether rectangles (m, n) lie beside a layer, and whether it covers all of them."""
+    if part.size is None:
+        beside, within = np.zeros((1, 1), bool), np.ones((1, 1), bool)
+    else:
+        outside, inside = [], []
+        lengths = part.size.width, part.size.height
+        for (first, last), center, length in zip((x, y), part.chart.center, lengths, strict=True):
+            outside.append((last <= center - length / 2) | (first >= center + length / 2))
+            inside.append((first >= center - length / 2) & (last <= center + length / 2))
+        beside, within = outside[1][:, None] | outside[0], inside[1][:, None] & inside[0]
+    if not part.chart.covers_frame:
+        within = np.zeros_like(within)
+    return beside, within

@@ -34,11 +34,14 @@ from vcam_cli.image_formation.layers.layer_edges import (
     moves_otherwise,
     partly_hidden,
     ray_reach,
+    spread_behind,
 )
 from vcam_cli.image_formation.layers.occlusion import RayLayer
 from vcam_cli.image_formation.layers.ray_cells import BORDER, Cells, Window
 from vcam_cli.image_formation.layers.ray_windows import (
     LEFT_OUT,
+    SIDE,
+    WIDEST_BORDER,
     RaySum,
     border_around,
     windows_with,
@@ -140,18 +143,18 @@ def layered_image(
     g, tolerance = path.geometry, path.settings.tolerance
     path = replace(path, full=min(path.full, _brightest_seen(path, scene)))
     layers = list(_layers_seen(path, scene, form))
-    light, bound = _composed(path, scene, layers)
+    light, bound, widest = _composed(path, scene, layers)
     own = math.hypot(*(layer.lost_rms(g) for layer in layers))
     full = min(KEPT * float(light.max(initial=0.0)), path.ceiling)
     usable, least = path.usable_error * full, RAYS_SHARE * tolerance * full
     allowed = math.sqrt(max(usable**2 - own**2, least**2))
     windows, left_out = windows_with(bound, LEFT_OUT * allowed)
-    border, beyond = border_around(path, _end(g, scene), rms(bound), allowed)
+    border, beyond = border_around(path, _end(g, scene), rms(widest), allowed)
     if any(map(moves_otherwise, path.layers)):  # at rest they would hide other light of each other
-        windows, left_out = [], float(np.sqrt(np.square(bound, dtype=float).mean()))
+        windows, left_out = [], rms(widest)
     far = [max(lengths) for lengths in zip(*map(ray_reach, path.layers), strict=True)]
     rays = RaySum(path, (far[0], far[1]), partial(_painted, path, scene), border)
-    left = math.hypot(left_out, beyond if windows else 0.0)
+    left = math.hypot(left_out, beyond)
     # No number of rays makes up for light from beyond a border that could not be wide enough.
     hidden = rays.add(light, windows, math.sqrt(max(allowed**2 - left**2, (allowed / 2) ** 2)))
     error = math.hypot(own, hidden.error, left)
@@ -192,15 +195,20 @@ def _layers_seen(path: OpticalPath, scene: LayeredScene, form: FormImage) -> Ite
 
 def _composed(
     path: OpticalPath, scene: LayeredScene, layers: Sequence[SeenLayer]
-) -> tuple[Array, Array]:
+) -> tuple[Array, Array, Array]:
     """Return the light (C, rows, columns) of layers one before the other [e/s].
 
-    And a bound (rows, columns) on what is missing from it in the color where it is most [e/s].
+    And two bounds (rows, columns) on what is missing from it in the color where it is most: of the
+    lights that rays of a pixel may see behind layers, and as if these were black and the brightest
+    everywhere [e/s].
     """
     g, white = path.geometry, float(path.transfer.level[-1].max())
     colors = len(path.transfer.weights[-1])
     total: Array = np.zeros((colors, g.rows, g.columns), path.settings.dtype)
     clear, bound = np.ones_like(total), np.zeros_like(total[0])
+    widest = np.zeros_like(bound)
+    far = WIDEST_BORDER * max(g.pitch_x, g.pitch_y)
+    spread = spread_behind(g, scene.parts, path.layers, path.transfer.level, far, SIDE)
     for layer in layers:
         here = slice(None), layer.window.rows, layer.window.columns
         total[here] += clear[here] * layer.light
@@ -208,10 +216,12 @@ def _composed(
         if behind:
             chart, optics = scene.parts[layer.number].chart, path.layers[layer.number]
             part = partly_hidden(g, chart, optics, layer.window, layer.cover)
-            most = white * max(part.brightest for part in behind)
-            bound[here[1:]] += most * np.minimum(part, clear[here].max(axis=0))
+            part = np.minimum(part, clear[here].max(axis=0))
+            widest[here[1:]] += white * max(one.brightest for one in behind) * part
+            rows, columns = (np.arange(s.start, s.stop) // SIDE for s in here[1:])
+            bound[here[1:]] += spread[layer.number][rows[:, None], columns] * part
             clear[here] *= 1 - layer.cover
-    return total, bound
+    return total, bound, widest
 
 
 def _brightest_seen(path: OpticalPath, scene: LayeredScene) -> float:

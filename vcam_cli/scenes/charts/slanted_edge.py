@@ -13,6 +13,7 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.scenes.base import Chart
+from vcam_cli.scenes.cells import Spans
 from vcam_cli.scenes.closed_form import Profile
 from vcam_cli.scenes.edge_energy import EXACT, EdgeEnergy, Region, counted_height
 from vcam_cli.scenes.runs import expand_ranges
@@ -62,6 +63,16 @@ class SlantedEdge(Chart):
         across, down = self._across
         distance = np.add.outer(down * np.asarray(y), across * np.asarray(x))
         return self._mix_levels(np.heaviside(distance, 0.5), mix)
+
+    def value_ends(self, x: Spans, y: Spans, mix: Array) -> tuple[Array, Array]:
+        """Return the least and the largest value in rectangles: both sides where the edge is."""
+        corners = [
+            np.sort(slope * np.stack(spans), axis=0)
+            for slope, spans in zip(self._across[::-1], (y, x), strict=True)
+        ]
+        sides = [np.add.outer(down, along) > 0 for down, along in zip(*corners, strict=True)]
+        ends = [self._mix_levels(side.astype(float), mix) for side in sides]
+        return np.minimum(*ends), np.maximum(*ends)
 
     def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
         """Return the energy of the edge, as if it lay along rows or columns."""
