@@ -241,13 +241,30 @@ def fast_margin(geometry: Geometry, least: int) -> int:
     int
         Pixels on every side.
     """
+    return fast_margin_around((geometry.rows, geometry.columns), least)
+
+
+def fast_margin_around(sizes: Sequence[int], least: int) -> int:
+    """Return the same of lengths that get one margin.
+
+    Parameters
+    ----------
+    sizes : sequence of int
+        Pixels along every axis.
+    least : int
+        Pixels on every side that it has at least.
+
+    Returns
+    -------
+    int
+        Pixels on every side.
+    """
     if least > LARGEST_TRANSFORM:
         return least
 
     def cost(margin: int) -> int:
         return sum((n + 2 * margin) * _work(n + 2 * margin) for n in sizes)
 
-    sizes = geometry.rows, geometry.columns
     return min(range(least, least + 33), key=lambda margin: (cost(margin), margin))
 
 

@@ -102,7 +102,8 @@ def partly_hidden(
     spread = high - low
     varied = spread > EVEN
     share = np.clip((mean - low) / np.where(varied, spread, 1), 0, 1)
-    return np.where(varied, spread * (share * (1 - share)).max(axis=0), 0)
+    most = (share * (1 - share)).max(axis=0)
+    return np.where(varied, spread * most, 0).astype(mean.dtype)
 
 
 def _opacity_range(

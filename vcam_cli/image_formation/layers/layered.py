@@ -28,7 +28,7 @@ from vcam_cli.effects.blurs import Blur, FieldTransfer, SeparableTransfer
 from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.floats import rms
 from vcam_cli.image_formation.estimates import memory_model
-from vcam_cli.image_formation.estimates.bandwidth import margin
+from vcam_cli.image_formation.estimates.bandwidth import fast_margin_around, margin
 from vcam_cli.image_formation.layers.layer_edges import (
     even_motion,
     moves_otherwise,
@@ -205,22 +205,28 @@ def _composed(
     g, white = path.geometry, float(path.transfer.level[-1].max())
     colors = len(path.transfer.weights[-1])
     total: Array = np.zeros((colors, g.rows, g.columns), path.settings.dtype)
-    clear, bound = np.ones_like(total), np.zeros_like(total[0])
-    widest = np.zeros_like(bound)
+    clear, bound, widest = np.ones_like(total[0]), np.zeros_like(total[0]), np.zeros_like(total[0])
     far = WIDEST_BORDER * max(g.pitch_x, g.pitch_y)
     spread = spread_behind(g, scene.parts, path.layers, path.transfer.level, far, SIDE)
-    for layer in layers:
-        here = slice(None), layer.window.rows, layer.window.columns
-        total[here] += clear[here] * layer.light
-        behind = scene.parts[layer.number + 1 :]
-        if behind:
-            chart, optics = scene.parts[layer.number].chart, path.layers[layer.number]
-            part = partly_hidden(g, chart, optics, layer.window, layer.cover)
-            part = np.minimum(part, clear[here].max(axis=0))
-            widest[here[1:]] += white * max(one.brightest for one in behind) * part
-            rows, columns = (np.arange(s.start, s.stop) // SIDE for s in here[1:])
-            bound[here[1:]] += spread[layer.number][rows[:, None], columns] * part
-            clear[here] *= 1 - layer.cover
+    hiding = [layer for layer in layers if layer.path.has_opacity]
+    for layer in hiding:
+        here = layer.window.rows, layer.window.columns
+        chart, optics = scene.parts[layer.number].chart, path.layers[layer.number]
+        part = partly_hidden(g, chart, optics, layer.window, layer.cover)
+        np.minimum(part, clear[here], out=part)
+        brightest = max(one.brightest for one in scene.parts[layer.number + 1 :])
+        widest[here] += (white * brightest) * part
+        rows, columns = (np.arange(s.start, s.stop) // SIDE for s in here)
+        part *= spread[layer.number].astype(part.dtype)[rows[:, None], columns]
+        bound[here] += part
+        clear[here] *= 1 - layer.cover.min(axis=0)
+    for layer in reversed(layers):
+        seen = total[:, layer.window.rows, layer.window.columns]
+        if layer.path.has_opacity:
+            seen *= 1 - layer.cover
+            seen += layer.light
+        else:
+            seen[:] = layer.light
     return total, bound, widest
 
 
@@ -443,6 +449,7 @@ def _window(g: Geometry, part: LayerPart, beyond: float) -> Window:
     ):
         first = math.floor(max(low - beyond / pitch, 0))
         last = math.ceil(min(high + beyond / pitch, count))
+        last = min(last + (last - first) % 2, count)  # odd numbers have few small factors
         spans.append(slice(first, max(first, last)))
     return Window(*spans)
 
@@ -452,12 +459,14 @@ def _chart_margin(g: Geometry, part: LayerPart, window: Window, most: int) -> tu
 
     At its end it is mirrored: all light that is there or in the mirror has to be farther from the
     window than `most` pixels, or within the chart. Of a layer that ends that far within the window
-    nothing is.
+    nothing is, but what makes transforms fast: 425 pixels, 5 x 5 x 17, take 1.6 times as long as
+    432.
     """
     found = []
     for (low, high), span in zip(_ends(g, part), (window.rows, window.columns), strict=True):
         inside = max(min(low - span.start, span.stop - high), -most)
-        found.append(min(max(math.ceil((most - inside) / 2), 0), most))
+        least = min(max(math.ceil((most - inside) / 2), 0), most)
+        found.append(fast_margin_around((span.stop - span.start,), least))
     return found[0], found[1]
 
 
