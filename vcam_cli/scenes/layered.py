@@ -182,7 +182,8 @@ class LayerChart(Chart):
         """
         if not isinstance(self.layer, MaskedChart):
             return None
-        own = ((low - c, high - c) for (low, high), c in zip((x, y), self.center, strict=True))
+        center_x, center_y = self.center
+        own = (x[0] - center_x, x[1] - center_x), (y[0] - center_y, y[1] - center_y)
         return self.layer.light.value_ends(*own, mix)
 
     def opacity_ends(self, x_edges: Array, y_edges: Array) -> tuple[Array, Array]:
@@ -223,8 +224,10 @@ class LayerChart(Chart):
     def profile(self) -> Profile | None:
         """Return the light of parallel straight edges that covers all, in its place; else None."""
         layer = self.layer
-        found = layer.light.profile() if isinstance(layer, MaskedChart) else None
-        if found is None or not (layer.opacity.mirrored and self.covers_frame):
+        if not (self.covers_frame and isinstance(layer, MaskedChart) and layer.opacity.mirrored):
+            return None
+        found = layer.light.profile()
+        if found is None:
             return None
         moved = np.dot(found.across, self.center)
         return replace(found, places=found.places + moved)

@@ -89,14 +89,25 @@ class PictureChart(Chart):
 
     def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
         """Return the energy of the steps from sample to sample, and of the picture's border."""
+        key = np.asarray(level, self.picture.dtype).tobytes(), ceiling
+        if key not in self._energies:
+            self._energies[key] = self._edges_times_length(level, ceiling)
+        area = self.frame.width * self.frame.height if self.mirrored else region.area
+        return EdgeEnergy(aligned=self._energies[key] / area)
+
+    @cached_property
+    def _energies(self) -> dict[tuple[bytes, float], float]:
+        """Energy times area by level and ceiling: every region has the same of it."""
+        return {}
+
+    def _edges_times_length(self, level: Array, ceiling: float) -> float:
         light = self.picture @ np.asarray(level, self.picture.dtype)
         down, across = self.frame.height / len(light), self.frame.width / light.shape[1]
         if not self.mirrored:
             light = np.pad(light, 1)
         steps_x = counted_height(light[:, 1:], light[:, :-1], ceiling).sum(dtype=float)
         steps_y = counted_height(light[1:], light[:-1], ceiling).sum(dtype=float)
-        area = self.frame.width * self.frame.height if self.mirrored else region.area
-        return EdgeEnergy(aligned=float(steps_x * down + steps_y * across) / area)
+        return float(steps_x * down + steps_y * across)
 
     def channel(self, number: int) -> "PictureChart":
         """Return one of its channels alone.

@@ -200,7 +200,7 @@ def closed_planes(path: OpticalPath, scene: SampledScene, mix: Array) -> Array:
     """
     if closed_opacity(path, scene) is None:
         return np.zeros(len(mix), bool)
-    return (mix[:, -1] != 0) & ~mix[:, :-1].any(axis=1)
+    return np.asarray((mix[:, -1] != 0) & ~mix[:, :-1].any(axis=1))
 
 
 def _scene_spectrum(

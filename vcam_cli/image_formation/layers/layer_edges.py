@@ -170,10 +170,9 @@ def spread_behind(
     found: list[Array] = []
     for part, own in reversed(list(zip(parts, optics, strict=True))):
         found.append((high - low).max(axis=0))
-        around = [
-            (first - reach - beyond, last + reach + beyond)
-            for (first, last), reach in zip(spans, ray_reach(own), strict=True)
-        ]
+        (first_x, last_x), (first_y, last_y) = spans
+        far_x, far_y = (reach + beyond for reach in ray_reach(own))
+        around = (first_x - far_x, last_x + far_x), (first_y - far_y, last_y + far_y)
         ends = part.chart.light_ends(*around, level[part.components].T)
         if ends is None:
             most = part.brightest * level[-1][:, None, None]
