@@ -261,7 +261,8 @@ def scene_bytes(picture: ScenePicture) -> int:
         Memory [bytes].
     """
     if isinstance(picture, tuple):
-        return sum(files.nbytes for files in picture)
+        arrays = (array for files in picture for array in (files.picture, files.mask))
+        return sum({id(one): one.nbytes for one in arrays if one is not None}.values())
     return getattr(picture, "nbytes", 0)
 
 

@@ -297,12 +297,12 @@ def composed_bytes(path: OpticalPath, layers: int) -> int:
     Returns
     -------
     int
-        Bytes: layers, their sum, what is clear before the next one, a product of it, a bound,
-        and the rays between them.
+        Bytes: layers, their sum, what a layer lets pass, what is clear before the next one, two
+        bounds, and the rays between them.
     """
     pixels = path.geometry.rows * path.geometry.columns
     width, colors = path.settings.float_width // 8, len(path.mosaic.colors)
-    held = layers + (3 * colors + 1) * pixels * width
+    held = layers + (2 * colors + 3) * pixels * width
     return BASE + RAYS + round(SLACK * held) + work_bytes(pixels, path.workers)
 
 

@@ -54,6 +54,7 @@ from vcam_cli.image_formation.optical_path import (
     SpectrumReport,
 )
 from vcam_cli.image_formation.transfer_functions import Transfer
+from vcam_cli.parallel import pieces, rows_at_once
 from vcam_cli.scenes.base import ChartScene
 from vcam_cli.scenes.image import ImageScene
 from vcam_cli.scenes.layered import LayeredScene, LayerPart
@@ -314,10 +315,12 @@ def gathered(
     out: Array = np.zeros((len(like), g.rows, g.columns), like.dtype)
     columns, rows = pixel_centers(g)
     for layer in layers:
-        weight = None if layer.weight is None else layer.weight(columns + at[0], rows + at[1])
-        for color, plane in enumerate(out):
-            found = layer.values(color, slice(0, g.rows))
-            plane += found if weight is None else found * weight
+        for some in pieces(g.rows, rows_at_once(g.columns)):
+            place = columns + at[0], rows[some] + at[1]
+            weight = None if layer.weight is None else layer.weight(*place)
+            for color, plane in enumerate(out):
+                found = layer.values(color, some)
+                plane[some] += found if weight is None else found * weight
         del layer  # its series is not held beside the next one
     return out
 
