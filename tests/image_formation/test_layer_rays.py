@@ -12,6 +12,7 @@ from optical_paths import aperture, path, sensor
 
 from vcam_cli import simulate
 from vcam_cli.effects.optics.diffraction import Diffraction
+from vcam_cli.image_formation.estimates import chart_cells, scene_sampling
 from vcam_cli.image_formation.layers import layered, ray_windows
 from vcam_cli.image_formation.layers.occlusion import RayLayer, covariance, rays
 from vcam_cli.image_formation.layers.ray_cells import Cells, SharpImage, Window
@@ -315,6 +316,66 @@ def wedge_before_star(speed: float) -> list[dict]:
         wedge["motion"] = {"x": f"{speed} m/s"}
     star = {"source": {"kind": "chart", "chart": "siemens-star"}, "distance": "2 m"}
     return [wedge, star]
+
+
+def cards_before_an_edge() -> list[dict]:
+    """Two layers of even rectangles, one out of focus, before a slanted edge."""
+    card = {"kind": "chart", "chart": "colorchecker"}
+    edge = {"kind": "chart", "chart": "slanted-edge"}
+    return [
+        {"source": card, "distance": "0.5 m", "width": "60 mm", "position": ["-40 mm", "0 mm"]},
+        {"source": edge, "distance": "0.8 m", "width": "100 mm", "position": ["20 mm", "10 mm"]},
+        {"source": edge, "distance": "2 m"},
+    ]
+
+
+@pytest.mark.parametrize("effects", [QUIET, RAYS_ALONE])
+def test_what_even_light_behind_hides_is_within_its_bound(effects, tmp_path, monkeypatch):
+    """Against windows that are chosen as if all light behind were black and white."""
+    given = {
+        "scene.source": {"kind": "layers", "layers": cards_before_an_edge()},
+        "scene.radiance": radiance_for(5000),
+        "optics": {"f_number": 2, "focal_length": "5 mm", "focus_distance": "1.2 m"},
+        "accuracy": "0.2 %",
+        "effects": effects,
+        "array.rows": 200,
+        "array.columns": 240,
+    }
+
+    def frame():
+        found = simulate(camera(tmp_path, given)).frame
+        return found.mean_electrons, found.spectrum.depth
+
+    def black_and_white(g, parts, optics, level, beyond, side):
+        return [np.full((g.rows, g.columns), level[-1].max())] * (len(parts) - 1)
+
+    some, depth = frame()
+    monkeypatch.setattr(layered, "spread_behind", black_and_white)
+    most, whole = frame()
+    assert depth.ray_values < 0.7 * whole.ray_values
+    apart = np.sqrt(np.mean(np.square(some - most))) / most.max()
+    assert apart <= depth.left_out + whole.left_out
+
+
+def test_opacity_in_closed_form_is_that_of_fine_cells(tmp_path, monkeypatch):
+    """A slanted edge in its frame: its opacity as a rectangle, and painted with its light."""
+    given = {
+        "scene.source": {"kind": "layers", "layers": cards_before_an_edge()[1:]},
+        "scene.radiance": radiance_for(5000),
+        "optics": {"f_number": 2, "focal_length": "5 mm", "focus_distance": "1.2 m"},
+        "effects": QUIET,
+        "accuracy": "0.2 %",
+        "array.rows": 120,
+        "array.columns": 150,
+    }
+    closed = simulate(camera(tmp_path, given)).frame
+    for module in (chart_cells, scene_sampling):
+        monkeypatch.setattr(module, "closed_opacity", lambda path, scene: None)
+    given["accuracy"] = "0.05 %"
+    painted = simulate(camera(tmp_path, given)).frame.mean_electrons
+    apart = np.sqrt(np.mean(np.square(closed.mean_electrons - painted))) / painted.max()
+    assert apart <= 0.002
+    assert closed.spectrum.parts[0][2].planes == 2
 
 
 @pytest.mark.long

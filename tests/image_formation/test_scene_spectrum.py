@@ -128,6 +128,25 @@ def test_opaque_layers_of_rectangles_are_rectangles(mirrored):
     assert MaskedChart(card, other).edges() is None
 
 
+@pytest.mark.parametrize("name", ["0.1 rad", "2 rad", "card"])
+def test_values_lie_between_their_ends(name):
+    """Against many points of each of some rectangles."""
+    card = ColorChecker(largest_card(Frame(80e-6, 50e-6)))
+    chart = {"0.1 rad": SlantedEdge(0.1, 0.6), "2 rad": SlantedEdge(2.0, 1.0)}.get(name, card)
+    rng = np.random.default_rng(3)
+    mix = rng.uniform(0, 1, (2, len(reflectances()) if chart is card else 1))
+    x, y = (np.sort(rng.uniform(-30e-6, 30e-6, (2, 40)), axis=0) for _ in range(2))
+    low, high = chart.value_ends((x[0], x[1]), (y[0], y[1]), mix)
+    parts = np.linspace(0.001, 0.999, 101)
+    along = (x[0][:, None] + (x[1] - x[0])[:, None] * parts).ravel()
+    down = (y[0][:, None] + (y[1] - y[0])[:, None] * parts).ravel()
+    values = chart.values(along, down, mix).reshape(2, 40, 101, 40, 101)
+    assert (values.min(axis=(2, 4)) >= low - 1e-12).all()
+    assert (values.max(axis=(2, 4)) <= high + 1e-12).all()
+    assert np.mean(np.abs(values.min(axis=(2, 4)) - low) < 1e-12) > 0.9
+    assert np.mean(np.abs(values.max(axis=(2, 4)) - high) < 1e-12) > 0.9
+
+
 def test_bars_within_a_cell_choose_the_light_that_is_seen():
     """Light and opacity that both change within cells: the mean of their product, by hand."""
     frame = Frame(4.0, 4.0)

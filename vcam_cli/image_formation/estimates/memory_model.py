@@ -52,8 +52,9 @@ WORK, WORK_OF_PIXEL = 12_000_000, 16
 EDGE = 46
 """Of a pixel that the response of a slanted edge is found from: codes, distances from the edge, and
 their order, as measured [bytes]."""
-RAYS = 30_000_000
-"""Rays between layers that are summed together, as measured before `table-top` at three sizes
+RAYS = 42_000_000
+"""Rays between layers that are summed together, and tables of lenses that are kept, as measured
+before `table-top` at three sizes and eight layers of rectangles
 [bytes]."""
 SCATTERED = 120
 """Pixel at a place of its own: positions, samples by color, the tree in which its neighbors are
