@@ -329,17 +329,20 @@ def cards_before_an_edge() -> list[dict]:
     ]
 
 
-@pytest.mark.parametrize("effects", [QUIET, RAYS_ALONE])
-def test_what_even_light_behind_hides_is_within_its_bound(effects, tmp_path, monkeypatch):
-    """Against windows that are chosen as if all light behind were black and white."""
+@pytest.mark.parametrize(("effects", "tails"), [(QUIET, 3e-5), (RAYS_ALONE, 1e-9)])
+def test_what_even_light_behind_hides_is_within_its_bound(effects, tails, tmp_path, monkeypatch):
+    """Against windows that are chosen as if all light behind were black and white.
+
+    Tails of what diffracts are not in the bound, but in the predicted error.
+    """
     given = {
         "scene.source": {"kind": "layers", "layers": cards_before_an_edge()},
         "scene.radiance": radiance_for(5000),
         "optics": {"f_number": 2, "focal_length": "5 mm", "focus_distance": "1.2 m"},
-        "accuracy": "0.2 %",
+        "accuracy": "0.03 %",
         "effects": effects,
-        "array.rows": 200,
-        "array.columns": 240,
+        "array.rows": 120,
+        "array.columns": 150,
     }
 
     def frame():
@@ -354,7 +357,7 @@ def test_what_even_light_behind_hides_is_within_its_bound(effects, tmp_path, mon
     most, whole = frame()
     assert depth.ray_values < 0.7 * whole.ray_values
     apart = np.sqrt(np.mean(np.square(some - most))) / most.max()
-    assert apart <= depth.left_out + whole.left_out
+    assert apart <= depth.left_out + whole.left_out + tails
 
 
 def test_opacity_in_closed_form_is_that_of_fine_cells(tmp_path, monkeypatch):
