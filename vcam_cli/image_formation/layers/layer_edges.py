@@ -134,9 +134,9 @@ def spread_behind(
 ) -> list[Array]:
     """Return how far apart lights are that rays of a pixel may see behind layers: a bound.
 
-    The light of a ray is a mean of the lights of layers, so it lies between the least and the largest of
-    them. A layer's light is not counted where it is beside all rays, nor that of those behind it
-    where it covers all.
+    The light of a ray is a mean of the lights of layers, so it lies between the least and the
+    largest of them. A layer's light is not counted where it is beside all rays, nor that of those
+    behind it where it covers all.
 
     Parameters
     ----------
