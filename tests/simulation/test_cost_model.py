@@ -1,9 +1,11 @@
 """Seconds that are foretold: what they have to grow with, and what they must not grow with."""
 
+import numpy as np
 import pytest
-from making import GONE, camera
+from making import GONE, QUIET, camera
 
 from vcam_cli.effects.noise.fpn import DRAW
+from vcam_cli.files.images.png import write_png
 from vcam_cli.simulation import cost_model
 from vcam_cli.simulation.simulate import prepare
 from vcam_cli.solve.solved import solve
@@ -62,3 +64,25 @@ def test_draws_of_a_pattern_that_are_skipped_are_seconds_saved(tmp_path):
     plan = planned["auto"].plan
     slow = cost_model.slowness() / cost_model.threads(1)
     assert plan.seconds_of_all - plan.seconds >= 0.99 * slow * DRAW * pixels
+
+
+def test_light_that_is_formed_again_saves_again(tmp_path):
+    """A camera meters a scene that moves at rest, and skips blurs of even light there, too."""
+    write_png(tmp_path / "gray.png", np.full((200, 300), 120, np.uint8))
+    source = {"kind": "image", "file": "gray.png", "model": "reflectance", "encoding": "linear"}
+    even = {
+        "scene.source": source,
+        "scene.radiance": GONE,
+        "scene.illuminant": "D65",
+        "scene.luminance": "100 cd/m2",
+        "exposure": {"auto": {"method": "white", "max": "1 s"}},
+        "effects": QUIET,
+    }
+    saved = []
+    for motion in ({}, {"scene.camera_motion": {"pan": "5 deg/s"}}):
+        plan = prepare(camera(tmp_path, even | motion), 1)[0].plan
+        assert plan.saved_by_light > 1e-4
+        once = cost_model.seconds_here(plan.saved_by_light, 1)
+        saved.append((plan.seconds_of_all - plan.seconds) / once)
+    assert saved[0] == pytest.approx(1, rel=1e-3), "gains of pixels save next to nothing"
+    assert 1.3 < saved[1] <= 2.01, "at rest there is no motion to skip"

@@ -177,6 +177,24 @@ def light_seconds(layout: Layout, report: SpectrumReport, workers: int) -> float
         Time [s].
     """
     core = image_seconds(layout.lattice, len(layout.mosaic.colors), report)
+    return seconds_here(core, workers)
+
+
+def seconds_here(core: float, workers: int) -> float:
+    """Return the time that work takes on this machine.
+
+    Parameters
+    ----------
+    core : float
+        Core seconds, as the plan counts them [s].
+    workers : int
+        Number of threads.
+
+    Returns
+    -------
+    float
+        Time [s].
+    """
     return core * slowness() / threads(workers)
 
 
@@ -228,4 +246,4 @@ def frame_seconds(camera: Solved, report: SpectrumReport, plan: Plan, workers: i
     core += output_seconds(camera)
     core += sample_seconds(camera, plan.active)
     core += irradiance_seconds(camera, report)
-    return core * slowness() / threads(workers)
+    return seconds_here(core, workers)

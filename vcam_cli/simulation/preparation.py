@@ -211,11 +211,13 @@ def plan_frame(
         max(seen.memory + written, of_light) + seen.picture_memory,
         light.spectrum.changes | exposed.changes,
     )
+    again = 2 if exposed.halves is not None else 0
     if of_kind(exposed.effects, ImageMotion):  # every sample has light of its own
+        again += len(exposed.times)
+    if again:
         once = cost_model.light_seconds(solved.layout, light.spectrum, run.workers)
-        run = run.after(len(exposed.times) * once)
-    if exposed.halves is not None:
-        run = run.after(2 * cost_model.light_seconds(solved.layout, light.spectrum, run.workers))
+        saved = cost_model.seconds_here(light.plan.saved_together, run.workers)
+        run = run.after(again * once, again * saved)
     decided = _with_seconds(solved, light, decided, run)
     run.stages.watch.expect(decided.seconds)
     return _prepared(seen, light, exposed, solved, decided)
@@ -276,9 +278,16 @@ def _with_seconds(
         for d in decided.decisions
     )
     of_electrons = sum(d.saved for d in decisions if d.name not in saved)
-    every = replace(decided, seconds=decided.seconds + of_electrons + light.plan.saved_together)
+    of_light = light.plan.saved_together
+    every = replace(decided, seconds=decided.seconds + of_electrons + of_light)
     seconds, of_all = (
         run.earlier + cost_model.frame_seconds(solved, light.spectrum, each, run.workers)
         for each in (decided, every)
     )
-    return replace(decided, decisions=decisions, seconds=seconds, seconds_of_all=of_all)
+    return replace(
+        decided,
+        decisions=decisions,
+        seconds=seconds,
+        seconds_of_all=of_all + run.earlier_saved,
+        saved_by_light=of_light,
+    )
