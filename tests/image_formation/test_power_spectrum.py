@@ -88,12 +88,13 @@ def test_blocks_hold_every_term_once(name):
 
 @pytest.mark.parametrize("name", AXES)
 def test_power_is_the_sum_over_all_terms(name):
-    """Of noise, without a lens: exact but for the mean over a square, judged at blocks' centers."""
+    """Of noise, without a lens: never less, and more as squares pass more at an end of a block."""
     x, y = AXES[name]
     plane = planes_of(x, y)
     power = power_spectrum(transform_planes(plane.copy(), 1), x, y, (), 1)
     every = np.square(amplitudes(plane[0], x, y))
-    assert power.filtered_power(flat())[0].sum() == pytest.approx(every.sum(), rel=2e-3)
+    found = power.filtered_power(flat())[0].sum()
+    assert every.sum() * (1 - 1e-9) <= found <= 1.02 * every.sum()
     assert power.products[0][0, 0] == pytest.approx(every[0, 0], rel=1e-12)
 
 

@@ -33,9 +33,8 @@ class Blocks:
     edges: Array
     """(b + 1,) first coefficients of blocks of the samples' spectrum, from 0, and the end."""
     weights: Array
-    """(n, b) from squares of those coefficients to mean squares of the terms in every block."""
-    largest_weights: Array
-    """The same, where a square of light passes most in a block."""
+    """(n, b) from squares of those coefficients to mean squares of the terms in every block, where
+    a square of light passes most of it."""
     low: Array
     """(n,) lowest frequency of every block of terms [cycles/m]."""
     high: Array
@@ -77,23 +76,16 @@ def blocks(axis: Axis) -> Blocks:
     start, stop = np.concatenate(low)[inside], np.concatenate(high)[inside]
     stop = np.minimum(stop, axis.terms - 1)
     box = np.sinc(np.array([start, (start + stop) / 2, stop]) / (2 * axis.samples))
-    weight = np.square((box if axis.squares else 1 / box) / (2 * axis.samples))
+    weight = np.square((box if axis.squares else 1 / box) / (2 * axis.samples)).max(axis=0)
     weight *= np.where(start > 0, 2, 1)
     target = np.searchsorted(_starts(axis.terms), start, side="right") - 1
     merged = np.flatnonzero(np.diff(target, prepend=-1))
     row = np.cumsum(np.diff(target, prepend=-1) > 0) - 1
-    middle, largest = np.zeros((2, len(merged), len(starts)))
-    place = row, np.concatenate(source)[inside]
-    np.add.at(middle, place, weight[1])
-    np.add.at(largest, place, weight.max(axis=0))
+    weights = np.zeros((len(merged), len(starts)))
+    np.add.at(weights, (row, np.concatenate(source)[inside]), weight)
     step = 1 / (2 * axis.length)
-    return Blocks(
-        np.append(starts, count),
-        middle,
-        largest,
-        start[merged] * step,
-        np.maximum.reduceat(stop, merged) * step,
-    )
+    edges = np.append(starts, count)
+    return Blocks(edges, weights, start[merged] * step, np.maximum.reduceat(stop, merged) * step)
 
 
 @lru_cache(1 << 7)
@@ -116,8 +108,6 @@ class PowerSpectrum:
     y: Blocks
     products: Array
     """(pairs, blocks along y, blocks along x) of planes (r, s), r <= s, twice where they differ."""
-    largest_products: Array
-    """The same, where a square of light passes most in a block."""
     pairs: Sequence[Pair]
     """Those planes: all that any color sees together."""
     separable: tuple[SeparableTransfer, ...]
@@ -150,7 +140,7 @@ class PowerSpectrum:
         Array
             Mean squares (C, blocks along y, blocks along x) [(e/s)^2].
         """
-        return self._passed_power(tables, 1, self.products)
+        return self._passed_power(tables, 1)
 
     def pixel_power(self, power: Array) -> Array:
         """Return mean squares behind the separable transfer functions.
@@ -183,15 +173,31 @@ class PowerSpectrum:
         Array
             Mean squares (C, blocks along y, blocks along x) [(e/s)^2].
         """
-        powers = (self._passed_power(tables, n, self.largest_products) for n in range(3))
-        return self.pixel_power(reduce(np.maximum, powers))
+        return self.pixel_power(self.lens_powers(tables)[1])
 
-    def _passed_power(self, tables: Tables, place: int, products: Array) -> Array:
+    def lens_powers(self, tables: Tables) -> tuple[Array, Array]:
+        """Return the mean squares before the separable transfer functions, and the largest.
+
+        Parameters
+        ----------
+        tables : Tables
+            Transfer functions of the lens.
+
+        Returns
+        -------
+        middle, largest : Array
+            Those of `lens_power`, and each block where it passes most light, (C, blocks along y,
+            blocks along x) [(e/s)^2].
+        """
+        powers = [self._passed_power(tables, place) for place in range(3)]
+        return powers[1], reduce(np.maximum, powers)
+
+    def _passed_power(self, tables: Tables, place: int) -> Array:
         """Return what a lens passes at one of the `places` of the blocks (C, along y, along x)."""
         power = np.zeros((tables.colors, len(self.y.low), len(self.x.low)))
         for parity in tables.parities:
             values = _values(tables, parity, self.x, self.y, place)
-            for (r, s), squares in zip(self.pairs, products, strict=True):
+            for (r, s), squares in zip(self.pairs, self.products, strict=True):
                 for color in np.flatnonzero(tables.is_seen[r] & tables.is_seen[s]):
                     both = values[r, color] * values[s, color]
                     both *= squares
@@ -215,8 +221,7 @@ class PowerSpectrum:
         """
         read = (np.abs(_values(tables, 0, self.x, self.y, place)) for place in range(3))
         values = reduce(np.maximum, read)
-        every = zip(self.pairs, self.largest_products, strict=True)
-        own = [squares for (r, s), squares in every if r == s]
+        own = [p for (r, s), p in zip(self.pairs, self.products, strict=True) if r == s]
         amplitudes = values * np.sqrt(np.maximum(own, 0))[:, None]
         return self.pixel_power(np.square(amplitudes.sum(axis=0)))
 
@@ -369,17 +374,11 @@ def power_spectrum(
         Mean squares by block of terms.
     """
     along_x, along_y = blocks(x), blocks(y)
-    products: list[Array] = []
-    largest: list[Array] = []
+    products = []
     every = of or pairs(len(spectrum))
     sums = spectrum.products(along_y.edges, along_x.edges, workers, every)
     for (r, s), of_pair in zip(every, sums, strict=True):
         twice = 1 if r == s else 2
-        for found, y_weights, x_weights in (
-            (products, along_y.weights, along_x.weights),
-            (largest, along_y.largest_weights, along_x.largest_weights),
-        ):
-            found.append(twice * product(y_weights, product(of_pair, x_weights.T)))
-    return PowerSpectrum(
-        along_x, along_y, np.array(products), np.array(largest), every, tuple(separable)
-    )
+        squares = product(along_y.weights, product(of_pair, along_x.weights.T))
+        products.append(twice * squares)
+    return PowerSpectrum(along_x, along_y, np.array(products), every, tuple(separable))

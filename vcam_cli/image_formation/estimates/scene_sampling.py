@@ -153,11 +153,12 @@ def sampled_image(
     scene, spectrum, peak = _scene_spectrum(path, scene, highest, mixing[0])
     x, y = axes(path, scene, highest)
     power = power_spectrum(spectrum, x, y, path.separable, path.workers, tables.pairs)
+    lens_power, largest = power.lens_powers(tables)
     directed = (*exact.plane_blurs, *(ring.blur for ring in path.field_rings))
     squares = (
         power.upper_bound(bounding_tables(exact, size, mixing))
         if directed
-        else power.largest_power(tables)
+        else power.pixel_power(largest)
     )
     pitch = g.pitch_y, g.pitch_x
     density = math.prod(scene.extent) / (g.sensor_width * g.sensor_height)
@@ -175,7 +176,7 @@ def sampled_image(
         spectrum=spectrum,
         power=power,
         tables=tables,
-        lens_power=power.lens_power(tables),
+        lens_power=lens_power,
         highest=highest,
         lost_rms=float(np.sqrt(density)) * power.tail_rms(squares, highest, pitch),
         peak=peak,
