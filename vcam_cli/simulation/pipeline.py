@@ -118,8 +118,7 @@ def prepare_light(
         metered = form(solved.standing_still(), picture, run.unseen(run.rate_cache))
     once = cost_model.light_seconds(metered.layout, metered.spectrum, run.workers)
     timed = solved.timed(metered.exposure_time, metered.solved.gain, metered.times)
-    saved = cost_model.seconds_here(metered.plan.saved_by_light, run.workers)
-    ready = form(timed, picture, run.after(once, saved))
+    ready = form(timed, picture, run.after(once, lights=1))
     written = ready.solved.with_exposure(solved.exposure)
     return replace(ready, solved=written, exposure_limit=metered.exposure_limit)
 

@@ -85,8 +85,6 @@ class Plan:
     memory_bytes: int
     seconds_of_all: float = 0.0
     """Estimated time with everything on [s]."""
-    saved_by_light: float = 0.0
-    """Core seconds that effects on the light save which are skipped, each time it is formed [s]."""
     levels: tuple[float, ...] = ()
     """Noise-free signals of the scene at which noise is promised [electrons]."""
 

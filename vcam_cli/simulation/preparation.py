@@ -216,8 +216,7 @@ def plan_frame(
         again += len(exposed.times)
     if again:
         once = cost_model.light_seconds(solved.layout, light.spectrum, run.workers)
-        saved = cost_model.seconds_here(light.plan.saved_together, run.workers)
-        run = run.after(again * once, again * saved)
+        run = run.after(again * once, again)
     decided = _with_seconds(solved, light, decided, run)
     run.stages.watch.expect(decided.seconds)
     return _prepared(seen, light, exposed, solved, decided)
@@ -272,22 +271,17 @@ def _with_seconds(
     solved: Solved, light: photon_rate.Rate, decided: plan.Plan, run: Run
 ) -> plan.Plan:
     """Return the plan with the seconds of the frame, and of one with everything on."""
-    saved = light.plan.saved
+    lights = 1 + run.earlier_lights
+    saved = {name: lights * seconds for name, seconds in light.plan.saved.items()}
     decisions = tuple(
         replace(d, saved=saved[d.name]) if d.name in saved and d.state == "off" else d
         for d in decided.decisions
     )
     of_electrons = sum(d.saved for d in decisions if d.name not in saved)
-    of_light = light.plan.saved_together
+    of_light = lights * light.plan.saved_together
     every = replace(decided, seconds=decided.seconds + of_electrons + of_light)
     seconds, of_all = (
         run.earlier + cost_model.frame_seconds(solved, light.spectrum, each, run.workers)
         for each in (decided, every)
     )
-    return replace(
-        decided,
-        decisions=decisions,
-        seconds=seconds,
-        seconds_of_all=of_all + run.earlier_saved,
-        saved_by_light=of_light,
-    )
+    return replace(decided, decisions=decisions, seconds=seconds, seconds_of_all=of_all)

@@ -23,8 +23,8 @@ class Run:
     """Where light is filtered, and charge, noise and codes are computed."""
     earlier: float = 0.0
     """Estimated time of what came before, such as the autofocus; the plan counts it [s]."""
-    earlier_saved: float = 0.0
-    """Estimated time that skipped effects saved of it [s]."""
+    earlier_lights: int = 0
+    """How often light is formed in it, without the effects that the frame skips."""
 
     def unseen(self, rate_cache: RateCache | None = None) -> Run:
         """Return the same computation without an observer, for trials.
@@ -41,20 +41,20 @@ class Run:
         """
         return Run(self.workers, Stages(), rate_cache, self.device)
 
-    def after(self, seconds: float, saved: float = 0.0) -> Run:
+    def after(self, seconds: float, lights: int = 0) -> Run:
         """Return the same computation behind further work.
 
         Parameters
         ----------
         seconds : float
             Time of that work [s].
-        saved : float, optional
-            Time that skipped effects saved of it [s].
+        lights : int, optional
+            How often light is formed in it, without the effects that the frame skips.
 
         Returns
         -------
         Run
             Run that counts it as earlier.
         """
-        earlier, earlier_saved = self.earlier + seconds, self.earlier_saved + saved
-        return replace(self, earlier=earlier, earlier_saved=earlier_saved)
+        earlier, earlier_lights = self.earlier + seconds, self.earlier_lights + lights
+        return replace(self, earlier=earlier, earlier_lights=earlier_lights)
