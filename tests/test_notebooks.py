@@ -40,7 +40,12 @@ def test_pixels_have_a_best_size_though_snr_only_rises(instead):
     assert (np.diff(names["snrs"]) > 0).all()
 
 
-FEWER_PIXELS = {'"rows": 96, "columns": 96': '"rows": 64, "columns": 64'}
+FEWER_PIXELS = {
+    '"rows": 96, "columns": 96': '"rows": 64, "columns": 64',
+    "take(name, 8,": "take(name, 4,",
+    'take(f"flat_{share:g}", 8,': 'take(f"flat_{share:g}", 4,',
+}
+"""Half of the frames, and of each frame less than half of its pixels."""
 
 
 @pytest.mark.parametrize("instead", [FEWER_PIXELS, pytest.param({}, marks=pytest.mark.long)])
