@@ -15,7 +15,7 @@ from making import long_except
 from mutations import harmed
 from processes import VCAM, environment
 
-BLOCKS, CAMERAS, STUDIES = 10, 150, 50
+BLOCKS, CAMERAS, STUDIES = 20, 75, 25
 """2000 files, in blocks that processes can share."""
 SIMULATED = 25  # every so manieth camera that is accepted
 

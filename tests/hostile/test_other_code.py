@@ -158,7 +158,7 @@ def test_the_same_files_elsewhere_are_the_same_code(package, monkeypatch):
 
 def program(folder: Path, change: str = "") -> dict[str, str]:
     """The environment of a copy of the program, whose mean squared error is another one."""
-    shutil.copytree(PACKAGE, folder / "vcam_cli", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(PACKAGE, folder / "vcam_cli")  # with what is compiled already
     for shipped in ("configs", "schemas"):
         if not (folder / "vcam_cli" / shipped).exists():
             (folder / shipped).symlink_to(PACKAGE.parent / shipped)

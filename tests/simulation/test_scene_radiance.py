@@ -15,7 +15,8 @@ SMALL = {
     "array.columns": 32,
     "output.radiance": True,
     "effects": "all",
-    "accuracy": "reference",
+    "accuracy": {"tolerance": 1e-4},
+    "scene.wavelengths": {"start": "400 nm", "stop": "700 nm", "step": "20 nm"},
     "quality": [],
 }
 MONOCHROME = {**SMALL, "array.pattern": "monochrome", "processing": [{"black_level": "subtract"}]}
