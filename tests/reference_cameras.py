@@ -192,6 +192,10 @@ class Case:
 
 def error(camera, expected: np.ndarray) -> float:
     """rms over the array of engine - reference, as a fraction of full signal."""
-    found = np.asarray(vcam_cli.simulate(camera).mean_electrons, float)
+    return difference(np.asarray(vcam_cli.simulate(camera).mean_electrons, float), expected)
+
+
+def difference(found: np.ndarray, expected: np.ndarray) -> float:
+    """rms over the array of found - expected, as a fraction of full signal."""
     assert found.shape == expected.shape
     return float(np.sqrt(np.mean((found - expected) ** 2)) / expected.max())

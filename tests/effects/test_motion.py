@@ -172,7 +172,7 @@ def test_what_is_not_in_the_file_is_said(tmp_path):
 
 def test_without_speed_the_bytes_are_those_of_a_still_scene(tmp_path):
     few = {"array.rows": 12, "array.columns": 16}
-    source = {"kind": "chart", "chart": "dead-leaves"}
+    source = {"kind": "chart", "chart": "siemens-star"}
     still = mean(tmp_path, {"scene.source": source}, few)
     stopped = mean(tmp_path, {"scene.source": source | {"motion": {"x": "0 m/s"}}}, ROLLING, few)
     assert still.tobytes() == stopped.tobytes()

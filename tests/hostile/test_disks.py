@@ -119,12 +119,15 @@ class TestFilesThatMayNotGrow:
 
 
 class TestMounted:
+    """One of them is quick: it shows that what fails above is what a full disk fails at."""
+
     def test_a_run_onto_a_full_disk_leaves_nothing(self, disks):
         driver, folder = disks
         end = driver(folder, "run", "camera.yaml", *LARGE, "-q", "-o", "full/out")
         told(end, "the disk is full", "full/out")
         assert contents(seen(driver, folder / "full")) == {}
 
+    @pytest.mark.long
     def test_a_run_that_fits_and_one_that_does_not(self, disks):
         """The former results stay."""
         driver, folder = disks
@@ -134,6 +137,7 @@ class TestMounted:
         told(driver(folder, "run", "camera.yaml", *LARGE, "-q", "-o", "full/two"))
         assert contents(seen(driver, folder / "full")) == before
 
+    @pytest.mark.long
     def test_a_sweep_onto_a_full_disk_keeps_what_it_finished(self, disks):
         """What it kept is whole; where there is more room it goes on with it."""
         driver, folder = disks
@@ -149,6 +153,7 @@ class TestMounted:
         assert driver(folder, *line, "free/whole")["code"] == 0
         assert results(folder / "free" / "sweep") == results(folder / "free" / "whole")
 
+    @pytest.mark.long
     @pytest.mark.parametrize("command", ["run camera.yaml", "sweep study.yaml"])
     def test_a_read_only_disk_is_read_and_not_written(self, disks, command):
         driver, folder = disks

@@ -1,6 +1,5 @@
 """Names with spaces and letters of any language, links, and files where folders belong."""
 
-import itertools
 import os
 import shutil
 import subprocess
@@ -11,8 +10,7 @@ import processes
 import pytest
 import spectral_files as made
 import yaml
-from driver import Driver
-from making import GONE, tree
+from making import GONE, long_except, tree
 from typer.testing import CliRunner
 
 from vcam_cli.commands import main
@@ -144,18 +142,18 @@ def bound_by_permissions():
     return before
 
 
-def test_an_output_that_may_not_be_written(bound_by_permissions, tmp_path):
+@pytest.mark.parametrize("place", long_except(["locked/new"], ["locked", "locked/new"]))
+@pytest.mark.parametrize("command", long_except(["run"], ["run", "sweep"]))
+def test_an_output_that_may_not_be_written(command, place, bound_by_permissions, tmp_path):
     """A read-only folder: nothing comes into it, and what is there stays."""
     camera(tmp_path / "camera.yaml")
-    lines = (("run", "camera.yaml"), ("sweep", study(tmp_path)))
+    line = [command, "camera.yaml" if command == "run" else study(tmp_path), "-q", "-o", place]
     (tmp_path / "locked").mkdir()
     (tmp_path / "locked").chmod(0o555)
-    with Driver(*bound_by_permissions) as vcam:
-        for line, place in itertools.product(lines, ("locked", "locked/new")):
-            done = vcam(tmp_path, *line, "-q", "-o", place)
-            assert done["code"] == 3, done
-            assert len(done["said"].splitlines()) == 1, done
-            assert "permission denied; choose a folder you may write to" in done["said"], done
+    done = processes.vcam(line, tmp_path, before=bound_by_permissions)
+    assert done.code == 3, done
+    assert len(done.said.splitlines()) == 1, done
+    assert "permission denied; choose a folder you may write to" in done.said, done
     assert not os.listdir(tmp_path / "locked")
 
 

@@ -23,7 +23,9 @@ SLOW = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.function_s
 TIMES = int(os.environ.get("VCAM_FUZZ", "1"))
 """As many examples; `make fuzz` sets it."""
 few = settings(max_examples=4 * TIMES, suppress_health_check=SLOW)
-many = settings(max_examples=10 * TIMES, suppress_health_check=SLOW)
+many = settings(
+    max_examples=(5 if settings().max_examples < 100 else 10) * TIMES, suppress_health_check=SLOW
+)
 
 
 def camera_of(tree: Tree, folder, sets=()):

@@ -142,7 +142,10 @@ def test_filters_go_as_far_as_the_low_pass_of_rings(monkeypatch):
     assert rms(found.values, exact) < 0.05 * STANDARD.tolerance * exact.max()
 
 
-@pytest.mark.parametrize(("rows", "parts", "followed"), [(110, 10, 2), (240, 8, 0)])
+@pytest.mark.parametrize(
+    ("rows", "parts", "followed"),
+    [(110, 10, 2), pytest.param(240, 8, 0, marks=pytest.mark.long)],
+)
 def test_modes_are_left_out_of_far_light_that_hardly_counts(rows, parts, followed, monkeypatch):
     """Of bright patches around a small array those next to it count, around a larger one none.
 

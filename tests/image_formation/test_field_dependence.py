@@ -26,13 +26,13 @@ STEEP = ((0.0, ()), (1.0, ((8, 260e-9), (4, 200e-9))))
 """From 8 waves a pupil radius on a grid of the pupil is computed."""
 
 
-SENSOR = sensor(6, 8)
-PICTURE = np.random.default_rng(3).random((6, 8))
+SENSOR = sensor(4, 6)
+PICTURE = np.random.default_rng(3).random((4, 6))
 HALF_DIAGONAL = float(np.hypot(SENSOR.sensor_width, SENSOR.sensor_height)) / 2
 PERFECT = Diffraction(4.0, 0.0)
-HIGHEST = int(PERFECT.cutoff(WAVELENGTHS[0]) * 16 * PITCH) + 1
+HIGHEST = int(PERFECT.cutoff(WAVELENGTHS[0]) * 12 * PITCH) + 1
 """Harmonic of the mirrored picture that the lens still images."""
-FX, FY = (np.arange(-HIGHEST, HIGHEST + 1) / (n * PITCH) for n in (16, 12))
+FX, FY = (np.arange(-HIGHEST, HIGHEST + 1) / (n * PITCH) for n in (12, 8))
 
 
 def offsets(row: int, column: int) -> tuple[float, float]:

@@ -126,7 +126,7 @@ def test_layers_out_of_focus_before_bars(kind, tmp_path):
         ),
         1.0,
     )
-    truth = ray_sum(scene, 2500, 6)
+    truth = ray_sum(scene, 1600, 6)
 
     def check(accuracy, tolerance):
         given = {"scene.radiance": radiance_for(5000), "effects": RAYS_ALONE, "accuracy": accuracy}

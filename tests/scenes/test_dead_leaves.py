@@ -86,11 +86,11 @@ def test_cells_err_no_more_than_asked_for(part):
     Cells are a part of the smallest leaf's radius wide, the last three of them painted in parts.
     """
     mix, frame = np.ones((1, len(dead_leaves.PIGMENTS))), Frame(1.0, 0.7)
-    edges = cell_edges(400, part * dead_leaves.SMALLEST)
+    edges = cell_edges(200, part * dead_leaves.SMALLEST)
     thirds = edges[:-1, None] + np.diff(edges)[:, None] * np.array([0, 1 / 3, 2 / 3])
     inner = np.append(thirds.ravel(), edges[-1])
     fine = dead_leaves.dead_leaves(3, frame).averages(inner, inner, mix)
-    truth = fine.reshape(1, 400, 3, 400, 3).mean((2, 4))
+    truth = fine.reshape(1, 200, 3, 200, 3).mean((2, 4))
 
     def check(error):
         found = dead_leaves.dead_leaves(3, frame, error).averages(edges, edges, mix)
@@ -174,10 +174,11 @@ def test_averages_from_sums_over_one_period(parts, far, monkeypatch):
     count = int((2200 if far else 1400) / parts)
     edges = 0.0123 + cell_edges(count, parts / dead_leaves.FINEST)
     mix = np.random.default_rng(1).random((1, 12))
-    found = chart.averages(edges, edges, mix)[0]
+    few = edges[: count // 3]  # rows
+    found = chart.averages(edges, few, mix)[0]
     for name in ("SUMMED", "SUMMED_FAR"):
         monkeypatch.setattr(dead_leaves, name, np.inf)
-    error = (found - chart.averages(edges, edges, mix)[0]) / mix.sum()
+    error = (found - chart.averages(edges, few, mix)[0]) / mix.sum()
     assert 1e-6 < error.std() < (1e-3 if far else 6e-5)
     assert scipy.ndimage.gaussian_filter(error, 5.0).std() < 1e-5
 
@@ -186,7 +187,7 @@ def test_the_power_spectrum_is_that_of_natural_images():
     # Near 1/f^2 between a few cycles a picture and the smallest leaves; images scatter between
     # -1.6 and -2.4. Six seeds gave -2.0 in the mean, with a spread of 0.14.
     slopes = []
-    for seed in (1, 2, 3):
+    for seed in (1, 2):
         source = LEAVES | {"seed": seed}
         gray = build(scene(source), view(rows=256, columns=256), None).planes(np.ones((1, 12)))[0]
         window = np.hanning(256)[:, None] * np.hanning(256)
@@ -204,7 +205,7 @@ def test_coverage_that_is_kept_paints_the_same_bytes_in_any_colors(monkeypatch):
     monkeypatch.setattr(discs, "_COVERAGE", ByteCache(discs.KEPT))
     true, found = discs.coverage, []
     monkeypatch.setattr(discs, "coverage", lambda *a: found.append(a) or true(*a))
-    edges = cell_edges(40, 0.02)
+    edges = cell_edges(20, 0.02)
     draw = np.random.default_rng(1)
     mixes = [draw.uniform(-0.1, 1, (3, 12)).astype(np.float32) for _ in range(2)]
     chart = dead_leaves.DeadLeaves(3, 1.0)

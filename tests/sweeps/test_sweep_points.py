@@ -87,7 +87,7 @@ def test_points_hold_no_cameras(tmp_path):
         tracemalloc.stop()
         return size / len(made)
 
-    vary = {"pixel.width": {"start": "4 um", "stop": "5 um", "count": 40}}
+    vary = {"pixel.width": {"start": "4 um", "stop": "5 um", "count": 20}}
     study = sweep_file.read(written(tmp_path, vary=vary))
     points = sweep_points.grid(study).points
     cameras = held(lambda: [point.camera for point in points])
