@@ -44,6 +44,14 @@ def wheel(tmp_path_factory) -> Path:
     return build("wheel", ROOT, tmp_path_factory.mktemp("dist"))
 
 
+def test_the_sdist_holds_all_that_the_wheel_is_made_of():
+    found = {file.distribution_path for file in SdistBuilder(str(ROOT)).recurse_included_files()}
+    assert found >= {f"{f}/{n}" for f in FORCED for n in files(ROOT / f, FORCED[f])}
+    assert found >= {"README.md", "CITATION.cff", "mkdocs.yml", "docs/index.md"}
+    assert "tests/conftest.py" in found
+
+
+@pytest.mark.long
 def test_the_sdist_builds_the_same_wheel(wheel, tmp_path):
     with tarfile.open(build("sdist", ROOT, tmp_path)) as archive:
         archive.extractall(tmp_path / "source", filter="data")
@@ -80,6 +88,12 @@ def files(folder: Path, suffixes: tuple[str, ...]) -> set[str]:
     return {str(path.relative_to(folder)) for path in found if "__pycache__" not in path.parts}
 
 
+KINDS = (".py", ".csv", ".npz", ".json", ".typed", ".html", ".css", ".js")
+"""Of files that the package has beside those of `configs` and `schemas`."""
+FORCED = {"vcam_cli": KINDS, "configs": (".yaml", ".csv"), "schemas": (".json",)}
+"""Folders that the wheel is made of, and kinds of their files."""
+
+
 def test_all_of_configs_lies_in_the_package(installed):
     shipped = files(ROOT / "configs", (".yaml", ".csv"))
     assert shipped
@@ -96,11 +110,10 @@ def test_all_schemas_lie_where_the_shipped_files_look_for_them(installed):
 
 
 def test_all_sources_and_data_tables(installed):
-    kinds = (".py", ".csv", ".npz", ".json", ".typed", ".html", ".css", ".js")
-    mine = files(ROOT / "vcam_cli", kinds)
+    mine = files(ROOT / "vcam_cli", KINDS)
     there = {
         n
-        for n in files(installed / "vcam_cli", kinds)
+        for n in files(installed / "vcam_cli", KINDS)
         if not n.startswith(("configs/", "schemas/"))
     }
     assert {n for n in mine if n.startswith("data/")}

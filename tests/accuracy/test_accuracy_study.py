@@ -29,8 +29,8 @@ NOISY = {
     "pixel.readout.read_noise": "9 e",
     "pixel.readout.reset_noise": "12 e",
     "pixel.fpn": {"offset_pixel": "4 e", "offset_column": "2 e", "gain_pixel": "1 %"},
-    "array.rows": 20,
-    "array.columns": 24,
+    "array.rows": 12,
+    "array.columns": 16,
     "effects": "auto",
     "accuracy": "standard",
 }

@@ -467,9 +467,7 @@ LIMITED = SENSOR | {"max_time": "1 s", "dark_current": "1 fA"}
 @pytest.mark.parametrize(
     ("pdf", "sensor"),
     [
-        pytest.param(HARD[0], LIMITED, marks=pytest.mark.draws),
-        (HARD[0], None),
-        *itertools.product(HARD[1:], [None, LIMITED]),
+        *itertools.product(HARD, [None, LIMITED]),
     ],
 )
 def test_hard_pdfs_have_plain_answers(pdf, sensor):

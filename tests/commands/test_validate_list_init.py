@@ -166,7 +166,7 @@ class TestMain:
     @pytest.mark.parametrize(
         "case",
         long_except(
-            [(["validate", "starter"], "1"), (["list", "--json"], "")],
+            [(["list", "--json"], "")],
             itertools.product([["--help"], ["validate", "starter"], ["list", "--json"]], ["", "1"]),
         ),
     )

@@ -20,7 +20,7 @@ from typer.testing import CliRunner
 
 from vcam_cli import load, simulate
 from vcam_cli.commands.main import app
-from vcam_cli.datasets import dataset_file
+from vcam_cli.datasets import dataset_file, drawing, parts
 from vcam_cli.datasets.dataset import dataset
 from vcam_cli.datasets.parts import Hasher, cut
 from vcam_cli.errors import BadInput
@@ -221,9 +221,16 @@ def test_workers_kills_and_order_change_no_byte(many, tmp_path):
     assert made(study, tmp_path / "out").computed == 0
 
 
-def test_a_shard_is_packed_behind_its_last_part(many, tmp_path):
+def test_a_shard_is_packed_behind_its_last_part(tmp_path, monkeypatch):
     """A progress bar looks at the folder: parts of a whole shard are removed meanwhile."""
-    study, out = many
+    for module in (parts, drawing):
+        monkeypatch.setattr(module, "MOST_TOGETHER", 5)
+    study = written(
+        tmp_path, frames=16, shards=2, size={"rows": 10, "columns": 12}, write=["raw", "clean"]
+    )
+    assert [len(part) for part in parts_of(study)] == [5, 3, 5, 3]
+    out = tmp_path / "before"
+    assert made(study, out).computed == 16
     seen = []
 
     class Watch(Silent):
