@@ -58,7 +58,7 @@ FLOORS = (
 """From the bottom: a module imports from floors below its own, and from its own room (package)."""
 FLOOR = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}
 FLOOR[""] = len(FLOORS)  # vcam_cli/__init__.py, the face of it all
-HEAVY = ("colour", "matplotlib", "scipy.signal", "scipy.optimize", "scipy.interpolate")
+HEAVY = ("colour", "cupy", "matplotlib", "scipy.signal", "scipy.optimize", "scipy.interpolate")
 UNFINISHED = ("TODO", "FIXME", "XXX", "HACK", "NotImplementedError")
 WRITERS = {
     "write_text", "write_bytes", "touch", "tofile", "savetxt", "savez", "savez_compressed",
@@ -345,6 +345,7 @@ BROKEN = [
     (image_library, "scenes.image", "def f():\n    import OpenImageIO as oiio\n"),
     (heavy, "physics.x", "from scipy import signal\n"),
     (heavy, "physics.x", "import scipy.interpolate as si\n"),
+    (heavy, "devices.x", "import cupy\n"),
     (heavy, "physics.x", "class A:\n    import colour\n"),
     (heavy, "physics.x", "try:\n    from matplotlib import pyplot\nexcept OSError: ...\n"),
     (writes, "sweeps.x", "open('a', 'w')\n"),

@@ -168,6 +168,7 @@ def test_too_large_a_batch_is_refused(monkeypatch):
         next(frames(load("starter", SIZE), pictures()))
 
 
+@pytest.mark.long  # the rules of test_house.py find an import at the top of a module
 def test_without_cupy_nothing_is_imported():
     code = "import sys, vcam_cli.simulation.simulate, vcam_cli.batches.frames\n"
     code += "print('cupy' in sys.modules)"

@@ -46,23 +46,23 @@ def test_dark_currents_spread_as_stated(tmp_path):
 def test_dark_currents_make_shot_noise_of_their_own(tmp_path):
     """In frames of one sensor the mean differs from pixel to pixel, and the variance with it.
 
-    Of 60 frames: their mean follows the pixel's dark signal with a slope of 1, their variance too;
-    5 standard errors, of the slope of variances 5 sqrt(2 / 59 / pixels) mean / spread.
+    Of 30 frames: their mean follows the pixel's dark signal with a slope of 1, their variance too;
+    5 standard errors, of the slope of variances 5 sqrt(2 / 29 / pixels) mean / spread.
     """
     changes = DARK | {"pixel.fpn.dark": "20 %"}
     dark = frame(tmp_path, changes, only("fpn")).electrons
     frames = np.array(
         [
             frame(tmp_path, changes, only("fpn", "shot_noise"), {"seed.frame": seed}).electrons
-            for seed in range(60)
+            for seed in range(30)
         ]
     )
     slope = np.polyfit(dark.ravel(), frames.mean(0).ravel(), 1)[0]
-    assert slope == pytest.approx(1, abs=5 * math.sqrt(400 / 60 / PIXELS) / 80)
+    assert slope == pytest.approx(1, abs=5 * math.sqrt(400 / 30 / PIXELS) / 80)
     variance = frames.var(0, ddof=1)
     slope = np.polyfit(dark.ravel(), variance.ravel(), 1)[0]
-    assert slope == pytest.approx(1, abs=5 * math.sqrt(2.2 / 59 / PIXELS) * 400 / 80)
-    assert variance.mean() == pytest.approx(400, rel=5 * math.sqrt(2.2 / 59 / PIXELS))
+    assert slope == pytest.approx(1, abs=5 * math.sqrt(2.2 / 29 / PIXELS) * 400 / 80)
+    assert variance.mean() == pytest.approx(400, rel=5 * math.sqrt(2.2 / 29 / PIXELS))
 
 
 def test_no_dark_current_is_below_zero(tmp_path):

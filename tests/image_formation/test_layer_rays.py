@@ -295,7 +295,7 @@ def test_layers_in_a_corner_and_nothing_behind(tmp_path):
         "scene.source": {"kind": "layers", "layers": layers},
         "scene.radiance": radiance_for(5000),
         "effects": QUIET,
-        "accuracy": "standard",
+        "accuracy": "reference",
         "array.rows": 200,
         "array.columns": 200,
         "optics": {"f_number": 8, "focal_length": "5 mm", "focus_distance": "1 m"},
