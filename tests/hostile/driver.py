@@ -164,10 +164,17 @@ def _load(file: Path) -> None:
     Where it is empty, a fork runs both to tell it.
     """
     if not file.stat().st_size:
+        for name in (
+            "vcam_cli.commands.main",
+            "vcam_cli.simulation.simulate",
+            "vcam_cli.sweeps.sweep",
+        ):
+            importlib.import_module(name)  # most of them, which the fork need not load itself
         file.write_text(json.dumps(_used()))
     for name in json.loads(file.read_text()):
         with contextlib.suppress(ImportError):
             importlib.import_module(name)
+    importlib.import_module("vcam_cli").load("starter")  # and what is kept of units and of tables
 
 
 def _used() -> list[str]:
@@ -175,7 +182,10 @@ def _used() -> list[str]:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder)
         (path / "study.yaml").write_text(STUDY)
-        sets = [f"--set={s}" for s in ("array.rows=16", "array.columns=24", "quality=[mse]")]
+        sets = [
+            f"--set={s}"
+            for s in ("array.rows=16", "array.columns=24", "quality=[mse]", "accuracy=draft")
+        ]
         process = os.fork()
         if process == 0:
             with (path / "names").open("w") as names, (path / "said").open("w") as said:
