@@ -91,7 +91,7 @@ def test_pixels_see_the_convolution_of_their_own_place(tmp_path, kind):
     )
     found = simulate(model).electrons / simulate(even).electrons
     rng = np.random.default_rng(4)
-    rows, columns = rng.integers(10, ROWS - 10, 12), rng.integers(10, COLUMNS - 10, 12)
+    rows, columns = rng.integers(10, ROWS - 10, 8), rng.integers(10, COLUMNS - 10, 8)
     x, y = ((n + 0.5 - size / 2) * PITCH for n, size in ((columns, COLUMNS), (rows, ROWS)))
     errors = found[rows, columns] - seen(model, x, y)
     assert np.sqrt(np.mean(np.square(errors))) < 0.002 * found.max()

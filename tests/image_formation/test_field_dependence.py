@@ -136,10 +136,8 @@ def test_a_filter_that_doubles_the_image_acts_beside_a_field(filter_kind, plates
     """Displaced copies of what every pixel's own wavefront makes."""
     field = FieldBlur(LENS, GROWING, HALF_DIAGONAL)
     expected = by_own_wavefronts(field, copies)
-    # One of them at reference, which takes most of the time.
-    preset, tolerance = PRESETS["reference" if plates[0] == (2 * FAR, FAR) else "standard"]
-    found = through(field, filter_kind(plates), knobs=replace(preset, tolerance=tolerance))
-    assert rms(found, expected) <= tolerance
+    found = through(field, filter_kind(plates), knobs=replace(REFERENCE, tolerance=0.0005))
+    assert rms(found, expected) <= 0.0005
     assert rms(expected, by_own_wavefronts(field)) > 0.01
 
 
