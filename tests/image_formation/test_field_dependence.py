@@ -118,7 +118,9 @@ FAR = 300e-6
     ("filter_kind", "plates", "copies"),
     [
         pytest.param(
-            ObliqueLowPass, (COPIES,), ((0.8e-6, 0.55e-6), (-0.8e-6, -0.55e-6)), id="oblique"
+            *(ObliqueLowPass, (COPIES,), ((0.8e-6, 0.55e-6), (-0.8e-6, -0.55e-6))),
+            id="oblique",
+            marks=pytest.mark.long,
         ),
         # 10 times the tolerance where their product with the lens was a table
         pytest.param(
