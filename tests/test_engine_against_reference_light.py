@@ -80,9 +80,10 @@ def check(case: Case, folder: Path) -> None:
 
 def test_coma_has_its_orientation(tmp_path):
     # were it mirrored or turned, it would fit a mirrored or turned lens
-    case = Case(lasers(COMA), laser_setup, PICTURE)
+    picture = leaves(12, 16, 3, seed=11)
+    case = Case(lasers(COMA, size="6, columns: 8"), laser_setup, picture)
     camera = case.load(tmp_path, "coma", "all", "standard")
-    setup = case.reference(camera, PICTURE)
+    setup = case.reference(camera, picture)
     found = np.asarray(vcam_cli.simulate(camera).mean_electrons, float)
     wrong = (
         ((7, -0.03e-6), (8, -0.05e-6)),

@@ -303,6 +303,7 @@ def test_raw_dng_corrects_each_color(tmp_path):
     color = DAYLIGHT | {
         "array.pattern": "bayer-rggb",
         "pixel.photodetector.quantum_efficiency": 0.5,
+        "accuracy": "draft",
     }
     frame = simulate(camera(tmp_path, POINTS | color | lens)).frame
     found = _warp(frame)

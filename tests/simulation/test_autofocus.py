@@ -207,6 +207,7 @@ PHASE = EDGE | {
 MASKED = {
     "pixel.phase_detection": {"masked": {"period": [2, 2]}},
     "scene.source": {"kind": "chart", "chart": "slanted-edge"},
+    "array.rows": 48,
     "array.columns": 256,
 }
 
