@@ -21,6 +21,7 @@ from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.scene_spectrum import Pair, SceneSpectrum, pairs
 from vcam_cli.image_formation.transfer_tables import Tables, reader
 from vcam_cli.parallel import product
+from vcam_cli.physics.cache import ByteCache
 
 WIDTH = 1 / 20
 """Width of a block relative to its frequency: the lowest 40 terms are blocks of their own."""
@@ -321,7 +322,14 @@ def _read_tables(tables: Tables, parity: int, x: Blocks, y: Blocks, place: int) 
     return reader(tables, parity, x.places[place]).values(y.places[place])
 
 
-_read_radial = lru_cache(12)(_read_tables)
+def _read_radial(tables: Tables, parity: int, x: Blocks, y: Blocks, place: int) -> Array:
+    key = tables, parity, x, y, place
+    return _RADIAL.get(key, lambda: _read_tables(tables, parity, x, y, place))
+
+
+KEPT = 1 << 22
+"""Bytes of values over |f| that are kept."""
+_RADIAL: ByteCache[Array] = ByteCache(KEPT, strict=True)
 """Values of one lens are the same for all pictures of a size."""
 
 
