@@ -62,7 +62,7 @@ class ByteCache(Generic[T]):
     def __init__(self, limit: int, strict: bool = False) -> None:
         self._limit, self._least = limit, 0 if strict else 1
         self._kept: OrderedDict[object, tuple[T, int]] = OrderedDict()
-        self._nbytes = 0
+        self._nbytes = self._asked = 0
         self._lock = Lock()
 
     def __reduce__(self) -> tuple[type[ByteCache[T]], tuple[int, bool]]:
@@ -94,12 +94,15 @@ class ByteCache(Generic[T]):
         with self._lock:
             if key in self._kept:
                 self._kept.move_to_end(key)
-                return self._kept[key][0]
+                found, nbytes = self._kept[key]
+                self._asked += nbytes
+                return found
         value = compute()
         with self._lock:
             self._nbytes -= self._kept.pop(key, (value, 0))[1]
             self._kept[key] = value, value.nbytes
             self._nbytes += value.nbytes
+            self._asked += value.nbytes
             while len(self._kept) > self._least and self._nbytes > self._limit:
                 self._nbytes -= self._kept.popitem(last=False)[1][1]
         return value
@@ -114,3 +117,8 @@ class ByteCache(Generic[T]):
     def nbytes(self) -> int:
         """Memory that the results took when they were computed [bytes]."""
         return self._nbytes
+
+    @property
+    def asked(self) -> int:
+        """The same of all results that `get` has returned so far, kept before or not [bytes]."""
+        return self._asked

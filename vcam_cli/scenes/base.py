@@ -372,6 +372,11 @@ class Chart(ABC):
             Values (R, len(y), len(x)), in the unit of `mix`.
         """
 
+    @property
+    def source_bytes(self) -> int:
+        """Memory of what it is painted from, and which is kept for other cameras [bytes]."""
+        return self.painted.source_bytes if self.painted else 0
+
     def painting_bytes(self, cells: PaintedCells) -> int:
         """Return the memory of temporary arrays of a thread that paints cells, beside their values.
 

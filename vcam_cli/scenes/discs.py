@@ -185,6 +185,14 @@ def painted_once(arrays: Sequence[Array], more: Hashable, make: Callable[[], P])
     return cast(P, _COVERAGE.get((digest.digest(), more), make))
 
 
+def asked_bytes() -> int:
+    """Return the memory of all coverage that was asked for so far [bytes].
+
+    What an image takes of it is the difference, up to `KEPT`, whatever was kept before.
+    """
+    return _COVERAGE.asked
+
+
 def forget() -> None:
     """Keep no coverage of what was painted."""
     _COVERAGE.clear()

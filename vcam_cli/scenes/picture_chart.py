@@ -51,6 +51,7 @@ class PictureChart(Chart):
     def painting_bytes(self, cells: PaintedCells) -> int:
         """Return the memory of temporary arrays: rows of samples, mixed, and cells of a plane."""
         _, width, channels = self.picture.shape
+        width = min(width, math.ceil(cells.extent[0] * width / self.frame.width) + 2)
         of_sample = self.picture.itemsize * channels + cells.values
         return int(cells.shape[0] * width * of_sample + self.picture.itemsize * cells.count)
 

@@ -52,10 +52,6 @@ WORK, WORK_OF_PIXEL = 12_000_000, 16
 EDGE = 46
 """Of a pixel that the response of a slanted edge is found from: codes, distances from the edge, and
 their order, as measured [bytes]."""
-RAYS = 42_000_000
-"""Rays between layers that are summed together, and tables of lenses that are kept, as measured
-before `table-top` at three sizes and eight layers of rectangles
-[bytes]."""
 SCATTERED = 120
 """Pixel at a place of its own: positions, samples by color, the tree in which its neighbors are
 found [bytes]."""
@@ -285,7 +281,7 @@ def half_image_bytes(pixels: int, with_disparity: bool) -> int:
     return pixels * (HALVES + DISPARITY * with_disparity)
 
 
-def composed_bytes(path: OpticalPath, layers: int) -> int:
+def composed_bytes(path: OpticalPath, layers: int, rays: int) -> int:
     """Return the memory of layers that are composed.
 
     Parameters
@@ -294,17 +290,20 @@ def composed_bytes(path: OpticalPath, layers: int) -> int:
         Lens, pixels and settings.
     layers : int
         Memory of the light and cover of all layers [bytes].
+    rays : int
+        Memory of the rays between them [bytes].
 
     Returns
     -------
     int
         Bytes: layers, their sum, what a layer lets pass, what is clear before the next one, two
-        bounds, and the rays between them.
+        bounds; then the rays.
     """
     pixels = path.geometry.rows * path.geometry.columns
     width, colors = path.settings.float_width // 8, len(path.mosaic.colors)
     held = layers + (2 * colors + 3) * pixels * width
-    return BASE + RAYS + round(SLACK * held) + work_bytes(pixels, path.workers)
+    work = max(round(SLACK * rays), work_bytes(pixels, path.workers))
+    return BASE + round(SLACK * held) + work
 
 
 def sub_exposure_bytes(geometry: Geometry, knobs: Settings, colors: int) -> int:

@@ -55,7 +55,8 @@ from vcam_cli.image_formation.optical_path import (
 )
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.parallel import pieces, rows_at_once
-from vcam_cli.scenes.base import ChartScene
+from vcam_cli.scenes import discs
+from vcam_cli.scenes.base import ChartScene, PaintedCells
 from vcam_cli.scenes.image import ImageScene
 from vcam_cli.scenes.layered import LayeredScene, LayerPart
 from vcam_cli.spectra import Spectrum
@@ -142,6 +143,7 @@ def layered_image(
         How the scene was sampled and filtered.
     """
     g, tolerance = path.geometry, path.settings.tolerance
+    asked = discs.asked_bytes()
     path = replace(path, full=min(path.full, _brightest_seen(path, scene)))
     layers = list(_layers_seen(path, scene, form))
     light, bound, widest = _composed(path, scene, layers)
@@ -154,7 +156,8 @@ def layered_image(
     if any(map(moves_otherwise, path.layers)):  # at rest they would hide other light of each other
         windows, left_out = [], rms(widest)
     far = [max(lengths) for lengths in zip(*map(ray_reach, path.layers), strict=True)]
-    rays = RaySum(path, (far[0], far[1]), partial(_painted, path, scene), border)
+    painted, painting = partial(_painted, path, scene), partial(_painting_bytes, path, scene)
+    rays = RaySum(path, (far[0], far[1]), painted, painting, border)
     left = math.hypot(left_out, beyond)
     # No number of rays makes up for light from beyond a border that could not be wide enough.
     hidden = rays.add(light, windows, math.sqrt(max(allowed**2 - left**2, (allowed / 2) ** 2)))
@@ -169,7 +172,10 @@ def layered_image(
         ray_values=hidden.values,
     )
     layer = Layer(lambda color, rows: light[color, rows])
-    return iter([layer]), _report(path, layers, error, depth)
+    kept = min(discs.asked_bytes() - asked, discs.KEPT)
+    kept += sum(part.chart.source_bytes for part in scene.parts)
+    memory = round(memory_model.SLACK * kept) + _held_bytes(path, layers, hidden.memory)
+    return iter([layer]), _report(layers, error, depth, memory)
 
 
 def _layers_seen(path: OpticalPath, scene: LayeredScene, form: FormImage) -> Iterator[SeenLayer]:
@@ -289,6 +295,15 @@ def _painted(path: OpticalPath, scene: LayeredScene, cells: Cells) -> list[RayLa
         if planes[-1].min() >= 1:
             break
     return found if len(found) > 1 else []
+
+
+def _painting_bytes(path: OpticalPath, scene: LayeredScene, cells: Cells) -> int:
+    """Return the memory of temporary arrays while layers are painted on cells [bytes]."""
+    x, y = cells.edges()
+    values = (len(path.mosaic.colors) + 1) * path.settings.float_width // 8
+    extent = float(x[-1] - x[0]), float(y[-1] - y[0])
+    painted = PaintedCells((len(y) - 1, len(x) - 1), max(cells.sides), extent, values)
+    return max(part.chart.painting_bytes(painted) for part in scene.parts)
 
 
 def gathered(
@@ -502,18 +517,22 @@ def is_of_lens(effect: Effect) -> bool:
     return moves or (effect.origin == "lens" and bool(of_kind([effect], Blur, FieldTransfer)))
 
 
-def _report(
-    path: OpticalPath, layers: Sequence[SeenLayer], error: float, depth: DepthReport
-) -> SpectrumReport:
-    """Return the report on the image of layers, with its error [e/s]."""
-    reports = [layer.report for layer in layers]
-    names = {name for own in reports for name in own.changes}
+def _held_bytes(path: OpticalPath, layers: Sequence[SeenLayer], rays: int) -> int:
+    """Return the memory of layers while they are formed and composed, with that of rays [bytes]."""
     held, forming = 0, 0
     for layer in layers:  # while one is formed, those before it are kept
         cover = layer.cover.nbytes if layer.path.has_opacity else 0  # else the same number all over
         held += layer.light.nbytes + cover
         forming = max(forming, layer.report.memory + held)
-    composed = memory_model.composed_bytes(path, held)
+    return max(memory_model.composed_bytes(path, held, rays), forming)
+
+
+def _report(
+    layers: Sequence[SeenLayer], error: float, depth: DepthReport, memory: int
+) -> SpectrumReport:
+    """Return the report on the image of layers, with its error [e/s] and memory [bytes]."""
+    reports = [layer.report for layer in layers]
+    names = {name for own in reports for name in own.changes}
     return SpectrumReport(
         oversampling=max((own.oversampling for own in reports), default=0.0),
         lost_rms=error,
@@ -521,7 +540,7 @@ def _report(
             name: math.hypot(*(own.changes.get(name, 0.0) for own in reports)) for name in names
         },
         peak=math.inf,
-        memory=max(composed, forming),
+        memory=memory,
         depth=depth,
         parts=tuple(
             (layer.path.geometry, len(layer.path.mosaic.colors), layer.report) for layer in layers

@@ -160,6 +160,32 @@ def front_to_back(layers: Sequence[Planes]) -> Array:
     return total
 
 
+def covariance_bytes(layers: Sequence[RayLayer], inner: tuple[int, int]) -> int:
+    """Return the memory of layers on cells and of arrays from which `covariance` is found.
+
+    Parameters
+    ----------
+    layers : sequence of RayLayer
+        Layers on cells, the nearest first.
+    inner : tuple of int
+        Rows and columns of cells that have rays.
+
+    Returns
+    -------
+    int
+        Bytes: planes, what each lets pass, sums over rays, and of these the spectra of all groups,
+        of one, and their product; in 64 bits the transfer, and what it is found from.
+    """
+    if not layers:
+        return 0
+    last = layers[-1].planes
+    planes = sum(layer.planes.nbytes for layer in layers)
+    passed = sum(layer.planes[-1].nbytes for layer in layers[:-1])
+    colors, cells = len(last) - 1, math.prod(inner)
+    images = len(layers) * colors + len(layers) - 1
+    return int(planes + passed + cells * (4 * images * last.itemsize + 4 * colors * 8))
+
+
 def covariance(
     layers: Sequence[RayLayer],
     groups: Sequence[Array],

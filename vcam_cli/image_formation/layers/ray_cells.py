@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from itertools import chain
 
 import numpy as np
 import scipy.fft
@@ -24,9 +23,12 @@ from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.image_formation.layers.occlusion import Sums
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.transfer_functions import Transfer
+from vcam_cli.physics.cache import ByteCache
 
 BORDER = 4
 """Pixels around a window from which diffraction and diffusion bring light."""
+KNOWN = 1 << 23
+"""Bytes of transfers that are kept for windows of a size: small ones are many of few sizes."""
 TINY = 1e-9
 """Width of a photodetector that is a point [cells]."""
 NARROWEST = 1e-3
@@ -209,7 +211,7 @@ class SharpImage:
         white = path.transfer.weights.sum(axis=0, keepdims=True)
         blurs = (*lens, *of_kind(behind, Blur))
         self._transfer = Transfer(path.transfer.wavelengths, white, blurs)
-        self._known: dict[tuple[int, tuple[int, int]], Array] = {}
+        self._known: ByteCache[Array] = ByteCache(KNOWN)
         self._tables: dict[tuple[float, float], tuple[Array, Array]] = {}
 
     @property
@@ -243,6 +245,11 @@ class SharpImage:
         return [rays[number == own] for own in np.unique(number)]
 
     @property
+    def nbytes(self) -> int:
+        """Memory of the transfers that are known [bytes]."""
+        return self._known.nbytes
+
+    @property
     def is_local(self) -> bool:
         """Whether pixels see their own area alone."""
         return not (self._transfer.effects or self._separable)
@@ -268,13 +275,15 @@ class SharpImage:
         )
         return x, y
 
-    def at_pixels(self, cells: Cells, groups: Iterable[Sums]) -> tuple[Array, Array]:
+    def at_pixels(self, cells: Cells, count: int, groups: Iterable[Sums]) -> tuple[Array, Array]:
         """Return the means over rays in every color at the pixels.
 
         Parameters
         ----------
         cells : Cells
             Cells of a window.
+        count : int
+            Number of groups; they are summed up one by one.
         groups : iterable of Sums
             Groups of rays, and sums over them of images on the inner cells: of light (n, C, h, w)
             and of opacity (m, h, w).
@@ -284,17 +293,15 @@ class SharpImage:
         light, cover : Array
             Values (n, C, rows, columns) and (m, C, rows, columns) at the pixels.
         """
-        every = iter(groups)
-        first, second = next(every), next(every, None)
-        if second is not None:
-            spectra = self._waves(cells, chain([first, second], every))
+        if count > 1:
+            spectra = self._waves(cells, groups)
         elif self.is_local:
-            rays, light, cover = first
+            ((rays, light, cover),) = groups
             images = (image / len(rays) for image in (light, cover[:, None]))
             light, cover = (self._collected(cells, image, (-2, -1)) for image in images)
             return light, np.broadcast_to(cover, (len(cover), *light.shape[1:]))
         else:
-            spectra = self._means(cells, first)
+            spectra = self._means(cells, *groups)
         light, cover = (self._on_pixels(cells, spectrum) for spectrum in spectra)
         return light, np.broadcast_to(cover, (len(cover), *light.shape[1:]))
 
@@ -316,6 +323,7 @@ class SharpImage:
             passed = passed + len(rays) * share
             light = light + scipy.fft.rfft2(own_light) * share
             cover = cover + scipy.fft.rfft2(own_cover[:, None]) * share
+            del own_light, own_cover  # they are not held beside the next group's
         transfer = self._on(cells)
         # How many pairs of points there are is that of the lens's own transfer, exactly.
         transfer = np.divide(
@@ -387,9 +395,9 @@ class SharpImage:
 
         From cells to pixels along y: their first one's mean lies where the first cell of all does.
         """
-        key = cells.per_pixel, cells.inner
-        if key in self._known:
-            return self._known[key]
+        return self._known.get((cells.per_pixel, cells.inner), lambda: self._made_on(cells))
+
+    def _made_on(self, cells: Cells) -> Array:
         blur, n = self._transfer, cells.per_pixel
         fx, fy = self._frequencies(cells)
         found: Array = np.ones((1, len(fy), len(fx)))
@@ -401,8 +409,7 @@ class SharpImage:
         waves = np.outer(scipy.fft.fftfreq(len(fy)), cells.border + np.arange(n))
         collected = np.exp(2j * np.pi * waves) @ self._shares(cells, -2) / n
         found = found * collected[:, None]
-        self._known[key] = found.astype(np.complex64 if cells.single else np.complex128)
-        return self._known[key]
+        return found.astype(np.complex64 if cells.single else np.complex128)
 
     def _frequencies(self, cells: Cells) -> tuple[Array, Array]:
         """Return the frequencies along x and y of transforms of images [cycles/m]."""

@@ -36,7 +36,7 @@ from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.effects.optics.shaped_blur import opening_of
 from vcam_cli.image_formation.estimates.bandwidth import line_spread_tail
-from vcam_cli.image_formation.layers.occlusion import RayLayer, covariance, rays
+from vcam_cli.image_formation.layers.occlusion import RayLayer, covariance, covariance_bytes, rays
 from vcam_cli.image_formation.layers.ray_cells import BORDER, Cells, SharpImage, Window
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.parallel import results
@@ -116,6 +116,8 @@ class Hidden:
     """Bound on the rms of what was left out [e/s]."""
     values: int = 0
     """Values that were looked up."""
+    memory: int = 0
+    """Memory that it took [bytes]."""
 
 
 @dataclass(eq=False)
@@ -131,6 +133,8 @@ class _Sum:
     values: int = 0
     before: Array | None = None
     """Light of the sum before, where that counts, too [e/s]."""
+    memory: int = 0
+    """While it was summed up [bytes]."""
 
 
 @dataclass(frozen=True)
@@ -141,6 +145,8 @@ class RaySum:
     furthest: tuple[float, float]
     """How far a ray meets a layer from where it reaches the sensor, along x and y [m]."""
     paint: Paint
+    painting_bytes: Callable[[Cells], int]
+    """What memory that takes, beside its result."""
     border: int = BORDER
     """Pixels around a window from which light diffracts into it."""
     sharp: SharpImage = field(init=False)
@@ -186,13 +192,17 @@ class RaySum:
         for one in sums:
             light[:, one.window.rows, one.window.columns] += one.light
         np.maximum(light, 0, out=light)
+        most = max((one.memory for one in sums), default=0)
+        memory = self.sharp.nbytes + sum(one.light.nbytes for one in sums)
+        memory += min(self.path.workers, len(sums)) * most
         used = [one for one in sums if one.light.any()]
         if not used:
-            return Hidden()
+            return Hidden(memory=memory)
         finest = self.levels[max(one.level for one in used)]
         squares = sum(one.error for one in sums)
         error = stated * math.sqrt(squares / (g.rows * g.columns))
-        return Hidden(finest.cells, finest.rays, error, 0.0, sum(one.values for one in sums))
+        values = sum(one.values for one in sums)
+        return Hidden(finest.cells, finest.rays, error, 0.0, values, memory)
 
     def _first_sum(self, window: Window) -> _Sum:
         """Return the sum of the second level, whose cells are halves of the first one's."""
@@ -216,6 +226,7 @@ class RaySum:
 
     def _compared(self, fine: _Sum, coarse: _Sum) -> _Sum:
         apart, values = _squares(fine.light, coarse.light), fine.values + coarse.values
+        fine = replace(fine, memory=max(fine.memory, coarse.memory))
         if not self.sharp.is_local:
             return replace(fine, error=apart, values=values)
         if coarse.before is not None:
@@ -236,15 +247,17 @@ class RaySum:
     def _summed(self, level: int, cells: Cells, layers: Sequence[RayLayer]) -> _Sum:
         """Return the sum of a level."""
         of, dtype = self.levels[level], self.path.settings.dtype
+        memory = covariance_bytes(layers, cells.inner) + self.painting_bytes(cells)
         if all(layer.planes[-1].min() == layer.planes[-1].max() for layer in layers[:-1]):
             colors = len(self.path.mosaic.colors)
-            return _Sum(cells.window, level, np.zeros((colors, *cells.window.pixels), dtype))
+            none: Array = np.zeros((colors, *cells.window.pixels), dtype)
+            return _Sum(cells.window, level, none, memory=memory)
         groups = self.sharp.groups(rays(of.rays, level % 2, self.opening), of.rings, of.sectors)
-        seen = partial(self.sharp.at_pixels, cells)
+        seen = partial(self.sharp.at_pixels, cells, len(groups))
         light = covariance(layers, groups, cells.inner, cells.met, seen)
         traced = sum(map(len, groups))
         values = traced * sum(len(own.planes) for own in layers) * math.prod(cells.inner)
-        return _Sum(cells.window, level, light.astype(dtype), values=values)
+        return _Sum(cells.window, level, light.astype(dtype), values=values, memory=memory)
 
 
 def _squares(one: Array, other: Array) -> float:

@@ -118,6 +118,11 @@ class Leaves:
     factor: Array
     """Factor of each leaf's reflectance (n,)."""
 
+    @property
+    def nbytes(self) -> int:
+        """Memory [bytes]."""
+        return 5 * self.factor.nbytes
+
     def select(self, index: Array) -> "Leaves":
         """Return some of the leaves.
 
@@ -252,7 +257,7 @@ class CoveredCells:
     @property
     def nbytes(self) -> int:
         """Memory [bytes]."""
-        return self.coverage.nbytes + 5 * self.leaves.factor.nbytes
+        return self.coverage.nbytes + self.leaves.nbytes
 
     def paint(self, mix: Array, out: Array) -> None:
         """Write the averages (R, rows, columns) over the cells in the colors of `mix` (R, 12)."""
@@ -341,6 +346,11 @@ class DeadLeaves(Chart):
             self._paint_parts(parts, x_edges, y_edges, mix, out)
         if hidden is not None:
             out[:, *hidden] = 0
+
+    @property
+    def source_bytes(self) -> int:
+        """Memory of all leaves of the seed [bytes]."""
+        return generate_leaves(self.seed).nbytes
 
     def painting_bytes(self, cells: PaintedCells) -> int:
         """Return the memory of temporary arrays of a thread, for cells and parts of them."""
