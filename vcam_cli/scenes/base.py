@@ -373,9 +373,9 @@ class Chart(ABC):
         """
 
     @property
-    def source_bytes(self) -> int:
-        """Memory of what it is painted from, and which is kept for other cameras [bytes]."""
-        return self.painted.source_bytes if self.painted else 0
+    def sources(self) -> tuple[Array, ...]:
+        """Arrays that it is painted from, files aside, which charts may share."""
+        return self.painted.sources if self.painted else ()
 
     def painting_bytes(self, cells: PaintedCells) -> int:
         """Return the memory of temporary arrays of a thread that paints cells, beside their values.

@@ -12,6 +12,7 @@ from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.blurs import INTERPOLATION, PlaneTransfer
 from vcam_cli.image_formation import transfer_functions, transfer_tables
+from vcam_cli.image_formation.estimates import power_spectrum
 from vcam_cli.image_formation.estimates.bandwidth import axes
 from vcam_cli.image_formation.far_field import FarPart
 from vcam_cli.image_formation.field_dependence import ring_entries
@@ -52,6 +53,8 @@ WORK, WORK_OF_PIXEL = 12_000_000, 16
 EDGE = 46
 """Of a pixel that the response of a slanted edge is found from: codes, distances from the edge, and
 their order, as measured [bytes]."""
+TABLES = transfer_functions.KEPT + transfer_tables.KEPT + power_spectrum.KEPT
+"""Tables of lenses that are kept for later ones [bytes]."""
 SCATTERED = 120
 """Pixel at a place of its own: positions, samples by color, the tree in which its neighbors are
 found [bytes]."""

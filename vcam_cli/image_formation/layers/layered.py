@@ -173,7 +173,8 @@ def layered_image(
     )
     layer = Layer(lambda color, rows: light[color, rows])
     kept = min(discs.asked_bytes() - asked, discs.KEPT)
-    kept += sum(part.chart.source_bytes for part in scene.parts)
+    sources = {id(own): own.nbytes for part in scene.parts for own in part.chart.sources}
+    kept += sum(sources.values()) + memory_model.TABLES
     memory = round(memory_model.SLACK * kept) + _held_bytes(path, layers, hidden.memory)
     return iter([layer]), _report(layers, error, depth, memory)
 

@@ -119,9 +119,9 @@ class Leaves:
     """Factor of each leaf's reflectance (n,)."""
 
     @property
-    def nbytes(self) -> int:
-        """Memory [bytes]."""
-        return 5 * self.factor.nbytes
+    def arrays(self) -> tuple[Array, ...]:
+        """All that is known of the leaves."""
+        return self.discs.x, self.discs.y, self.discs.radius, self.pigment, self.factor
 
     def select(self, index: Array) -> "Leaves":
         """Return some of the leaves.
@@ -257,7 +257,7 @@ class CoveredCells:
     @property
     def nbytes(self) -> int:
         """Memory [bytes]."""
-        return self.coverage.nbytes + self.leaves.nbytes
+        return self.coverage.nbytes + sum(own.nbytes for own in self.leaves.arrays)
 
     def paint(self, mix: Array, out: Array) -> None:
         """Write the averages (R, rows, columns) over the cells in the colors of `mix` (R, 12)."""
@@ -348,9 +348,9 @@ class DeadLeaves(Chart):
             out[:, *hidden] = 0
 
     @property
-    def source_bytes(self) -> int:
-        """Memory of all leaves of the seed [bytes]."""
-        return generate_leaves(self.seed).nbytes
+    def sources(self) -> tuple[Array, ...]:
+        """All leaves of the seed."""
+        return generate_leaves(self.seed).arrays
 
     def painting_bytes(self, cells: PaintedCells) -> int:
         """Return the memory of temporary arrays of a thread, for cells and parts of them."""
