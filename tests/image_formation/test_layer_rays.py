@@ -175,7 +175,7 @@ def test_waves_diffract_from_rays_between_pairs_of_points(period, angle, rings, 
         wave = sum(np.cos(2 * np.pi * (x + y + by)) for by in moved)
         wave = np.broadcast_to(wave, (64, 64))
         groups.append((own, wave[None, None], wave[None]))
-    light, cover = sharp.at_pixels(cells, groups)
+    light, cover = sharp.at_pixels(cells, len(groups), groups)
     frequency = np.array(1 / (period * cell))
     terms = zernike.defocus(2 * 4.0 * radius, 4.0)
     otf = otf_circular(frequency, 550e-9, 4.0, 0.0)

@@ -115,6 +115,36 @@ def image_bytes(
     return BASE + most
 
 
+def thread_bytes(path: OpticalPath, scene: SampledScene, highest: float, planes: int) -> int:
+    """Return what several threads keep of their temporary arrays when they have formed an image.
+
+    The allocator of most systems has a heap for each of them: what is freed there is no room for
+    later arrays of the main thread. That adds up over layers, whose light is held.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    scene : SampledScene
+        The scene on its grid.
+    highest : float
+        Frequency up to which the spectrum is filtered [pixel Nyquist].
+    planes : int
+        Number of mixtures of the scene's components.
+
+    Returns
+    -------
+    int
+        Bytes; 0 of one thread.
+    """
+    if path.workers == 1:
+        return 0
+    width, (x, y) = path.settings.float_width // 8, axes(path, scene, highest)
+    painting, _ = _painting_bytes(path, scene, width * planes)
+    work = working_bytes(x, y, planes, len(path.mosaic.colors), width)
+    return max(path.workers * work, painting)
+
+
 def device_bytes(path: OpticalPath, scene: SampledScene, highest: float, planes: int) -> int:
     """Return the memory of a device that the spectrum of an image and its filtering take.
 
