@@ -47,6 +47,10 @@ class Blocks:
         return self.low, (self.low + self.high) / 2, self.high
 
 
+ReadTables = Callable[[Tables, int, Blocks, Blocks, int], Array]
+"""What reads tables of a parity at one of the `places` of blocks along x and y."""
+
+
 @lru_cache(64)
 def blocks(axis: Axis) -> Blocks:
     """Return the blocks of the terms of an axis.
@@ -114,19 +118,19 @@ class PowerSpectrum:
     separable: tuple[SeparableTransfer, ...]
 
     def filtered_power(self, tables: Tables) -> Array:
-        """Return the mean squares of every color's signal.
+        """Return the mean squares of every color's signal; what is read of the tables is not kept.
 
         Parameters
         ----------
         tables : Tables
-            Transfer functions of the lens.
+            Transfer functions of a lens that is looked at once.
 
         Returns
         -------
         Array
             Mean squares (C, blocks along y, blocks along x) [(e/s)^2].
         """
-        return self.pixel_power(self.lens_power(tables))
+        return self.pixel_power(self._passed_power(tables, 1, _read_tables))
 
     def lens_power(self, tables: Tables) -> Array:
         """Return the mean squares before the separable transfer functions.
@@ -193,11 +197,11 @@ class PowerSpectrum:
         powers = [self._passed_power(tables, place) for place in range(3)]
         return powers[1], reduce(np.maximum, powers)
 
-    def _passed_power(self, tables: Tables, place: int) -> Array:
+    def _passed_power(self, tables: Tables, place: int, read: ReadTables | None = None) -> Array:
         """Return what a lens passes at one of the `places` of the blocks (C, along y, along x)."""
         power = np.zeros((tables.colors, len(self.y.low), len(self.x.low)))
         for parity in tables.parities:
-            values = _values(tables, parity, self.x, self.y, place)
+            values = (read or _values)(tables, parity, self.x, self.y, place)
             for (r, s), squares in zip(self.pairs, self.products, strict=True):
                 for color in np.flatnonzero(tables.is_seen[r] & tables.is_seen[s]):
                     both = values[r, color] * values[s, color]
