@@ -186,7 +186,7 @@ def painted_once(arrays: Sequence[Array], more: Hashable, make: Callable[[], P])
 
 
 def asked_bytes() -> int:
-    """Return the memory of all coverage that was asked for so far [bytes].
+    """Return the memory of all coverage that was requested so far [bytes].
 
     What an image takes of it is the difference, up to `KEPT`, whatever was kept before.
     """
