@@ -172,3 +172,17 @@ def test_modes_are_left_out_of_far_light_that_hardly_counts(rows, parts, followe
     allowed = 0.1 * made.accuracy.tolerance * ablation.full_signal(few)
     assert error < allowed / 10
     assert error > 0
+
+
+def test_light_that_fills_pixels_many_times_is_on_finer_rings():
+    """Brighter than full signal by 500,000: rings must err by a ten-millionth of it at most."""
+    plain = before(*BLURS["f/8"])
+    scene = on_chart(plain, CHARTS["patches"], margin=900)
+    brightest = scene.chart.brightest
+    cells = {}
+    for times in (1e3, 5e5):
+        _, parts, _ = split(replace(plain, full=brightest / times), scene)
+        cells[times] = sum(math.prod(part.scene.shape) for part in parts)
+    assert cells[5e5] > 3 * cells[1e3]
+    _, finest, _ = split(replace(plain, settings=REFERENCE, full=brightest / 5e5), scene)
+    assert cells[5e5] == sum(math.prod(part.scene.shape) for part in finest)

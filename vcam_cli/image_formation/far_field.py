@@ -41,6 +41,11 @@ GROWTH = 4
 """Distance to the outer border of a ring over that to its inner one."""
 ROUNDING = 1e-9
 """Part of a length that is no length."""
+BRIGHT, BRIGHT_SHARE, BRIGHT_CELLS = 1e-7, 0.1, 32
+"""What rings err by at most, of the brightest light around an array, the part of the tolerance that
+this may take, and the cells over the distance to a ring where it is more. Patches 550,000 times as
+bright as full signal erred by 1.2e-8 of themselves on 16 cells, 1.3 tolerances at `standard`, and
+by 4e-12 on 32."""
 LOW_PASS = 1.84
 """Nyquist frequency of a ring's cells over that at which its low-pass is 1 / e. Of exp(-f^4) little
 is left at the former, 1e-5; its kernel falls fast and has no second moment, so that it leaves all
@@ -282,7 +287,8 @@ def far_parts(
     sensor = path.geometry.sensor_width, path.geometry.sensor_height
     inner, parts = near.extent, list[FarPart]()
     clear = min(a - b for a, b in zip(inner, sensor, strict=True)) / 2 - widest
-    cells = [math.ceil(path.settings.far_cells * size / clear / 2) for size in inner]
+    least = max(path.settings.far_cells, BRIGHT_CELLS if _is_bright(path, whole) else 0)
+    cells = [math.ceil(least * size / clear / 2) for size in inner]
     pitch = [size / n / 2 for size, n in zip(inner, cells, strict=True)]
     while any(a < b * (1 - ROUNDING) for a, b in zip(inner, whole.extent, strict=True)):
         clear *= GROWTH
@@ -294,6 +300,12 @@ def far_parts(
         inner = more[0] * pitch[0] * 2, more[1] * pitch[1] * 2
         cells, pitch = [n // GROWTH for n in more], [p * GROWTH for p in pitch]
     return parts
+
+
+def _is_bright(path: OpticalPath, chart: ChartScene) -> bool:
+    """Return whether a chart is so much brighter than full signal that rings may err by more."""
+    brightest = chart.brightest * float(np.abs(path.transfer.level).sum(axis=0).max())
+    return BRIGHT * brightest > BRIGHT_SHARE * path.settings.tolerance * path.full
 
 
 def _even_cells(size: float, pitch: float) -> int:
