@@ -110,10 +110,10 @@ def _overlapping_averages(
         painted = scene.chart.crop_to_cells(x_edges, cells).averages(x_edges, cells, mix)
         sums = np.zeros((len(mix), len(cells), len(x_edges)))
         sums[:, 1:, 1:] = painted.cumsum(axis=1, dtype=float).cumsum(axis=2)
-        across = _interpolated_sums(sums, right, 2) - _interpolated_sums(sums, left, 2)
-        inside = _interpolated_sums(across, bottom[rows] - first, 1) - _interpolated_sums(
-            across, top[rows] - first, 1
-        )
+        to_left, to_right = (_interpolated_sums(sums, edge, 2) for edge in (left, right))
+        across = to_right - to_left
+        above, below = (_interpolated_sums(across, edge[rows] - first, 1) for edge in (top, bottom))
+        inside = below - above
         out[:, rows] = inside / ((right - left)[0] * (bottom - top)[0])
     return out
 

@@ -304,7 +304,7 @@ def far_parts(
 
 def _is_bright(path: OpticalPath, chart: ChartScene) -> bool:
     """Return whether a chart is so much brighter than full signal that rings may err by more."""
-    brightest = chart.brightest * float(np.abs(path.transfer.level).sum(axis=0).max())
+    brightest = chart.brightest * path.transfer.largest_level
     return BRIGHT * brightest > BRIGHT_SHARE * path.settings.tolerance * path.full
 
 

@@ -161,7 +161,7 @@ class SampledSpectrum:
 
 @dataclass(frozen=True, eq=False)
 class JoinedSpectrum:
-    """The planes of several spectra, no two of which any color sees together."""
+    """Planes that lie in several spectra; no color sees planes of two of them."""
 
     parts: tuple[tuple[SceneSpectrum, int], ...]
     """By plane: the spectrum that it is in, and its number there."""

@@ -247,6 +247,11 @@ class Transfer:
         return level
 
     @property
+    def largest_level(self) -> float:
+        """Signal of the color with most light where all components are as bright as white [e/s]."""
+        return float(np.abs(self.level).sum(axis=0).max())
+
+    @property
     def is_dark(self) -> bool:
         """Whether no color sees any light of the scene."""
         return not self.weights.any()

@@ -211,11 +211,8 @@ class CellError:
             Rms error [e/s].
         """
         f, _ = self._table
-        across = (
-            2
-            * self._squared_transfer(f, np.zeros_like(f))
-            / np.square(2 * np.pi * (f + 1e-9 * f[-1]))
-        )
+        passed = self._squared_transfer(f, np.zeros_like(f))
+        across = 2 * passed / np.square(2 * np.pi * (f + 1e-9 * f[-1]))
         steps = (across[1:] + across[:-1]) / 2 * np.diff(f)
         beyond = (self.energy.aligned + self.energy.oblique) * steps[::-1].cumsum()[::-1]
         return float(f[np.count_nonzero(beyond > error**2)])
@@ -277,9 +274,8 @@ class CellError:
     def _passed_across(self) -> tuple[Array, Array]:
         """The squared transfer (n,) of waves along x, and along y."""
         f, _ = self._table
-        return self._squared_transfer(f, np.zeros_like(f)), self._squared_transfer(
-            np.zeros_like(f), f
-        )
+        still = np.zeros_like(f)
+        return self._squared_transfer(f, still), self._squared_transfer(still, f)
 
     @cached_property
     def _unit_edge(self) -> Array:

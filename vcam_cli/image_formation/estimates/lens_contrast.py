@@ -47,6 +47,7 @@ _CONTRASTS: ByteCache[Array] = ByteCache(1 << 20)
 
 
 def _contrast(path: OpticalPath, frequency: Array) -> Array:
+    """Compute what `lens_contrast` returns."""
     transfer, weights = path.transfer, path.judged_weights.sum(axis=0)
     if not path.field_rings:
         mean = (weights / (weights.sum() or 1.0)) @ transfer.otf_radial(frequency)

@@ -30,9 +30,8 @@ from vcam_cli.scenes.bands import bands_of_rows
 from vcam_cli.scenes.base import ChartScene, PaintedCells, SampledScene
 
 BASE = 147_000_000
-"""Interpreter and libraries of `vcam run`, 126 to 138 MB before even light, and modules that few
-frames import; a call of the library takes
-40 MB less [bytes]."""
+"""Interpreter and libraries of `vcam run`: 126 to 138 MB were measured before uniform scenes; few
+frames import further modules. A call of the library takes 40 MB less [bytes]."""
 LATER = 10_000_000
 """What of it is taken behind the light: 125 to 136 MB are taken before a chart is painted
 [bytes]."""

@@ -114,7 +114,7 @@ def rounding_error(path: OpticalPath, scene: SampledScene) -> float:
 
 def _single_error(path: OpticalPath, scene: SampledScene) -> float:
     """Return the rms error of transforms of 32-bit numbers [e/s]."""
-    return SINGLE * scene.brightest * float(np.abs(path.transfer.level).sum(axis=0).max())
+    return SINGLE * scene.brightest * path.transfer.largest_level
 
 
 def sampled_image(
@@ -214,7 +214,7 @@ def _scene_spectrum(
         scene = scene.with_cells(cell_grid(scene, path.geometry, BEYOND_CUTOFF * highest))
         x, y = axes(path, scene, highest)
         known = closed_spectrum(scene, mix, (y, x), dtype)
-        return scene, known, scene.brightest * float(np.abs(path.transfer.level).sum(axis=0).max())
+        return scene, known, scene.brightest * path.transfer.largest_level
     if isinstance(scene, ChartScene):
         x, y = axes(path, scene, highest)
         terms = y.terms, x.terms
