@@ -60,7 +60,6 @@ CHANGES = {
     "pixel.photodetector.dark_current_density": "5 nA/cm2",
     "pixel.photodetector.dark_current_scale": 3,
     "accuracy.shot_noise": {"preset": "draft", "shot_noise": "gaussian"},
-    "array.binning": {"rows": 2, "columns": 2, "kind": "voltage"},
     "effects": {"shot_noise": "off", "dark_current": "off"},
 }
 """Another value of every key on which the light does not depend."""
@@ -111,6 +110,7 @@ def test_the_light_does_not_depend_on_it(tmp_path, path, monkeypatch):
         ("scene.radiance", "0.2 W/(sr m2)"), ("accuracy", "standard"),
         ("effects", {"diffraction": "off"}), ("display.primaries", "srgb"),
         ("pixel.readout.full_well", "50 ke"),
+        ("array.binning", {"rows": 2, "columns": 2, "kind": "voltage"}),
     ],
 )  # fmt: skip
 def test_what_may_change_the_light_is_told_apart(tmp_path, path, value):

@@ -14,6 +14,7 @@ import pytest
         ("named", "a star of three spokes, 8 x 8"),  # 2.2 T: an edge lies along the columns
         ("array", "80268"),  # 2.4 T: rows were read by where their photodetectors are
         ("array", "80184"),  # 1.4 times the variance: levels of pixels, not of joined ones
+        ("array", "700303"),  # 1.07 T: light was judged by pixels, not by joined ones
         ("array", "200509"),  # black: no time is long enough for an automatic exposure
         ("field", "80012"),  # 1.2 T: few places on a stretch of the field
         ("depth", "100034"),  # variance: dark light was 2 % of full signal too high

@@ -176,6 +176,8 @@ def _blur_shares(cost: LightCost, budget: float) -> dict[Effect, float]:
         return dict.fromkeys(losses, math.inf)
     flat = scene.flat if isinstance(scene, LayeredScene | DepthScene) else scene
     bounds = flat.change_bounds(list(losses.values()), path.geometry, path.ceiling, budget)
+    # Pixels that are read as one have less than the brightest of them.
+    bounds = replace(bounds, full=min(bounds.full, path.full))
     shares: dict[Effect, float] = dict(zip(losses, bounds.shares(), strict=True))
     if has_straight_edges(flat):
         shares |= _edge_shares(cost, flat, losses, shares, bounds.full, budget)

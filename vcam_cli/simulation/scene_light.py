@@ -207,6 +207,8 @@ def formed_light(
 
     Margins are first as wide as white beside the array needs. Before an array that turns out much
     darker, the tails of what lies beside it are a larger part of full signal: it gets wider ones.
+    So it is with all errors where pixels are read as one: their largest signal is lower than that
+    of single pixels, by which `photo_rate` judges.
 
     Parameters
     ----------
@@ -232,13 +234,45 @@ def formed_light(
             else:
                 key = seen.light_key + run.device.key
                 light = run.rate_cache.rate(key, seen.path.ceiling, form)
-            wider = _widened(seen, picture, light)
-        if wider is seen:
+            full = _largest_read(seen, light.values)
+            better = _widened(_judged_by(full, seen, light), picture, full)
+        if better is seen:
             return seen, light
-        seen = wider
+        seen = better
 
 
-def _widened(seen: SceneLight, picture: ScenePicture, light: photon_rate.Rate) -> SceneLight:
+def _largest_read(seen: SceneLight, light: Array) -> float:
+    """Return the largest mean light of pixels that are read as one, at most what fills them [e/s].
+
+    `light` is that of every place of the lattice [e/s].
+    """
+    layout, ceiling = seen.solved.layout, seen.path.ceiling
+    groups = layout.binning_groups
+    if groups.count > 1:
+        light = layout.select_pixels(light)
+        if groups.summed_charges == 1:  # each pixel has a well of its own
+            light = np.minimum(light, light.dtype.type(ceiling))
+        light = groups.sums(light) / light.dtype.type(groups.count)
+    return min(float(light.max(initial=0.0)), ceiling)
+
+
+def _judged_by(full: float, seen: SceneLight, light: photon_rate.Rate) -> SceneLight:
+    """Return the scene with the full signal by which light is to be formed; itself where it was.
+
+    `full` is that of pixels that are read as one [e/s].
+    """
+    path = seen.path
+    alone = min(float(light.values.max(initial=0.0)), path.ceiling)
+    known = full * (1 + path.settings.tolerance)  # no better than by what light may err
+    if full == 0 or known >= min(alone, path.full):  # `photo_rate` has judged by these
+        return seen
+    omitted = replace(path, omitted_share=light.plan.share * alone / full)
+    if light.spectrum.lost_rms < omitted.usable_error * full:
+        return seen
+    return replace(seen, path=replace(path, full=full), light_key=f"{seen.light_key} {full}")
+
+
+def _widened(seen: SceneLight, picture: ScenePicture, full: float) -> SceneLight:
     """Return the scene with the margin that its light needs; itself where it has that.
 
     Layers predict themselves what their margins change.
@@ -246,7 +280,6 @@ def _widened(seen: SceneLight, picture: ScenePicture, light: photon_rate.Rate) -
     around, time = _rate_around(seen), seen.solved.exposure.time
     if around == 0 or not isinstance(seen.scene, SampledScene):
         return seen
-    full = min(float(light.values.max(initial=0.0)), seen.path.ceiling)
     full = max(full, 1 / time if time else 0.0)  # as defined, at least one electron
     overexposure = around / full if full > 0 else math.inf
     if overexposure <= DARKER * seen.overexposure:

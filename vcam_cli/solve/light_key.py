@@ -19,11 +19,12 @@ from vcam_cli.solve.settings import camera_settings
 OTHER_KEYS = (
     *("name", "seed", "exposure", "processing", "quality", "output"),
     *("display.dpi", "display.width", "display.viewing_distance"),
-    *("array.binning", "pixel.phase_detection", "pixel.readout.gain", "pixel.readout.timing"),
+    *("pixel.phase_detection", "pixel.readout.gain", "pixel.readout.timing"),
     *(f"pixel.readout.{key}" for key in SEVERAL_READOUTS),
 )
 """Keys behind the light that belong to no effect. Exposure, ADC and analog gain set the level at
-which a pixel is full, beyond which the light is not followed as exactly: see `RateCache.rate`."""
+which a pixel is full, beyond which the light is not followed as exactly: see `RateCache.rate`.
+Not `array.binning`: by the largest signal of what is read as one the light is judged."""
 _LISTED = {*OTHER_KEYS, *(key for kind in ORDER for key in kind.keys_behind_light)}
 
 
