@@ -4,8 +4,11 @@ import hashlib
 
 import numpy as np
 import pytest
+from making import camera
 
-from vcam_cli.rng import BLOCK_ROWS, blocks, coarse_normals, stream
+from vcam_cli import rng, simulate
+from vcam_cli.rng import BLOCK_ROWS, KeptNormals, blocks, coarse_normals, stream, streams
+from vcam_cli.simulation.shared import Shared
 
 
 @pytest.mark.parametrize("block", [0, 3, 1 << 40])
@@ -47,6 +50,37 @@ def test_neighboring_blocks_do_not_overlap():
     a = stream(1, "x", block=0).bit_generator.random_raw(20_000)
     b = stream(1, "x", block=1).bit_generator.random_raw(20_000)
     assert not np.isin(a, b).any()
+
+
+@pytest.mark.parametrize("rows", [5, 150])
+def test_kept_normals_are_those_of_the_stream(rows):
+    """Drawn together or in parts, again or for the first time, and whatever becomes of them."""
+    parts = (2, 3) if rows == 5 else (rows,)
+    for dtype in (np.float32, np.float64):
+        wanted = streams(3, "fpn", 0, 7, rows).standard_normal((rows, 9), dtype=dtype)
+        for _ in range(2):
+            kept = KeptNormals(3, "fpn", 0, 7, rows)
+            drawn = [kept.standard_normal((part, 9), dtype) for part in parts]
+            assert np.concatenate(drawn).tobytes() == wanted.tobytes()
+            for block in drawn:
+                block *= 0
+    other = KeptNormals(4, "fpn", 0, 7, rows).standard_normal((rows, 9), np.float32)
+    assert not np.isin(other, wanted).any()
+    chances = KeptNormals(3, "fpn", 0, 7, rows).random((rows, 9))
+    assert np.array_equal(chances, streams(3, "fpn", 0, 7, rows).random((rows, 9)))
+
+
+def test_normals_of_a_frame_are_drawn_once_per_sensor(tmp_path, monkeypatch):
+    """Frames of one sensor share the numbers of its fixed pattern, and those alone."""
+    drawn = []
+    true = rng.streams
+    monkeypatch.setattr(rng, "streams", lambda *key: drawn.append(key[:2]) or true(*key))
+    rng._NORMALS.clear()
+    strengths = {"offset_pixel": "3 e", "gain_pixel": "1 %"}
+    for frame in range(3):
+        made = camera(tmp_path, {"pixel.fpn": strengths, "seed": {"sensor": 5, "frame": frame}})
+        simulate(made, 1, shared=Shared())
+    assert sorted(drawn) == [(5, "fpn gain pixel"), (5, "fpn offset pixel")]
 
 
 @pytest.mark.parametrize("rows", [1, BLOCK_ROWS - 1, BLOCK_ROWS, BLOCK_ROWS + 1, 1000])

@@ -14,13 +14,14 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.random.bit_generator import ISeedSequence
 
 from vcam_cli.arrays import Array
+from vcam_cli.physics.cache import ByteCache
 
 BLOCK_ROWS = 64
 """Rows of the array that share one stream, and that flow together through the engine."""
@@ -122,11 +123,59 @@ class BlockStreams:
         return out
 
 
-Stream = np.random.Generator | BlockStreams
+class KeptNormals:
+    """A stream whose normal numbers are kept: those of a sensor are the same in all of its frames.
+
+    To copy them takes a twentieth of drawing them, which is a sixth of a frame of 512 x 512 pixels
+    of a data set.
+
+    Parameters
+    ----------
+    seed, effect, capture, block, rows
+        As those of `streams`.
+    """
+
+    def __init__(self, seed: int, effect: str, capture: int, block: int, rows: int) -> None:
+        self._key = seed, effect, capture, block, rows
+        self._next_row = 0
+
+    def standard_normal(self, size: tuple[int, int], dtype: type) -> Array:
+        """Return standard normal numbers (rows, columns)."""
+        rows, columns = size
+        whole = (self._key[-1], columns)
+        drawn = _NORMALS.get(
+            (self._key, columns, dtype),
+            lambda: streams(*self._key).standard_normal(whole, dtype=dtype),
+        )
+        start = self._next_row
+        self._next_row += rows
+        return drawn[start : self._next_row].copy()
+
+    def random(self, size: tuple[int, int]) -> Array:
+        """Return numbers from 0 to 1 (rows, columns)."""
+        return self._drawn.random(size)
+
+    def standard_exponential(self, size: tuple[int, int]) -> Array:
+        """Return standard exponential numbers (rows, columns)."""
+        return self._drawn.standard_exponential(size)
+
+    @cached_property
+    def _drawn(self) -> np.random.Generator | BlockStreams:
+        """The stream of what is not kept."""
+        return streams(*self._key)
+
+
+_NORMALS: ByteCache[Array] = ByteCache(1 << 22, strict=True)
+"""Of up to four arrays of 512 x 512 pixels, in 32 bits."""
+KEPT_PIXELS = 1 << 18
+"""Pixels of an array, at most, whose normal numbers are kept: they take less memory than one."""
+Stream = np.random.Generator | BlockStreams | KeptNormals
 """Where a draw takes its random numbers from."""
 
 
-def streams(seed: int, effect: str, capture: int = 0, block: int = 0, rows: int = 0) -> Stream:
+def streams(
+    seed: int, effect: str, capture: int = 0, block: int = 0, rows: int = 0
+) -> np.random.Generator | BlockStreams:
     """Return the stream of some rows from a block on: of several blocks, those of each.
 
     Parameters
@@ -162,6 +211,7 @@ def coarse_normals(generator: Stream, rows: int, columns: int, dtype: type) -> A
         Normal numbers (rows, columns).
     """
     words = -(-columns // 4)
+    assert not isinstance(generator, KeptNormals)  # these draw normal numbers of full precision
     if isinstance(generator, BlockStreams):
         raw = generator.random_raw(rows, words)
     else:

@@ -24,7 +24,15 @@ from vcam_cli.effects.signal_chain import (
     electron_effects,
 )
 from vcam_cli.parallel import each, slices_within
-from vcam_cli.rng import BLOCK_ROWS, Stream, runs_of_blocks, stream, streams
+from vcam_cli.rng import (
+    BLOCK_ROWS,
+    KEPT_PIXELS,
+    KeptNormals,
+    Stream,
+    runs_of_blocks,
+    stream,
+    streams,
+)
 
 AT_ONCE = 1 << 16
 """Pixels that flow together, about: a draw is made for them in the same order as for more."""
@@ -110,11 +118,15 @@ def sites(
     index = (layer << LAYER) + block.start // BLOCK_ROWS
     rows = block.stop - block.start
     sensor = _StreamCache(partial(streams, seeds["sensor"], block=index, rows=rows))
+    is_kept = rate.size <= KEPT_PIXELS and not coarse_normals
+    opened = {"sensor": KeptNormals if is_kept else streams, "frame": streams}
     return {
         scope: Site(
             rows=rows,
             columns=rate.shape[1],
-            stream=_StreamCache(partial(streams, seed, capture=sample, block=index, rows=rows)),
+            stream=_StreamCache(
+                partial(opened[scope], seed, capture=sample, block=index, rows=rows)
+            ),
             line_stream=partial(stream, seed, capture=sample, block=layer << LAYER),
             dtype=rate.dtype.type,
             dark=dark,
