@@ -236,11 +236,12 @@ def test_the_forecast_of_a_sequence_is_near_its_peak(scene, tmp_path):
 def test_what_does_not_fit_is_refused_before_it_is_taken(lens, monkeypatch):
     camera = load("colorchecker-d65", [*SMALL, *lens])
     needed = simulate(camera).frame.plan.memory_bytes
-    monkeypatch.setattr(memory, "available", lambda: needed - 1_000_000)
+    monkeypatch.setattr(memory, "LITTLE", 0)
+    monkeypatch.setattr(memory, "available", lambda: needed - memory_model.BASE - 1)
     with pytest.raises(CannotDo, match="GB of memory") as told:
         simulate(camera)
     assert "fewer pixels" in str(told.value)
-    monkeypatch.setattr(memory, "available", lambda: needed)
+    monkeypatch.setattr(memory, "available", lambda: needed - memory_model.BASE)
     simulate(camera)
 
 
@@ -252,7 +253,8 @@ def test_nothing_is_computed_that_does_not_fit(work, monkeypatch):
         raise AssertionError("computed")
 
     monkeypatch.setattr(strategies, work, compute)
-    monkeypatch.setattr(memory, "available", lambda: memory_model.BASE // 2)
+    monkeypatch.setattr(memory, "LITTLE", 0)
+    monkeypatch.setattr(memory, "available", lambda: 100)
     lens = OVER_THE_FIELD if work == "tabulate_field" else COMA
     with pytest.raises(CannotDo):
         simulate(load("colorchecker-d65", [*SMALL, lens]))
@@ -267,7 +269,7 @@ def test_charts_that_do_not_fit_are_not_painted(monkeypatch):
 def test_memory_is_asked_for_once_with_the_largest_part(monkeypatch):
     """Near field and rings of a wide margin: nothing is asked for while they are computed."""
     asked = []
-    monkeypatch.setattr(memory, "require", lambda needed, rows, columns: asked.append(needed))
+    monkeypatch.setattr(memory_model, "require", lambda needed, geometry: asked.append(needed))
     found = simulate(load("colorchecker-d65", [*FEW, STAR, "accuracy=reference"]))
     assert len(asked) == 3  # the frame without its scene, its spectrum, what that calls for
     assert asked[1] <= asked[2] == found.frame.spectrum.memory == found.frame.plan.memory_bytes

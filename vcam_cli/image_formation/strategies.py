@@ -22,7 +22,6 @@ from itertools import chain
 
 import numpy as np
 
-from vcam_cli import memory
 from vcam_cli.arrays import Array
 from vcam_cli.devices.processor import require
 from vcam_cli.effects.base import of_kind
@@ -151,7 +150,7 @@ def _mean_layers(path: OpticalPath, scene: SampledScene) -> tuple[Layers, Spectr
     g, level = path.geometry, path.transfer.level.T
     samples = 0 if isinstance(scene, ChartScene) else math.prod(scene.shape)
     needed = memory_model.box_average_bytes(samples, len(level), g, path.settings)
-    memory.require(needed, g.rows, g.columns)
+    memory_model.require(needed, g)
     if path.separable:
         signal = box_averages(scene, level, g, axes(path, scene, 1.0), path.workers)
     else:
@@ -184,7 +183,7 @@ def _spot_layers(
     """Return means over the photodetectors' areas of what rays blur to small spots."""
     g, level = path.geometry, path.transfer.level.T
     needed = memory_model.box_average_bytes(math.prod(scene.shape), len(level), g, path.settings)
-    memory.require(needed, g.rows, g.columns)
+    memory_model.require(needed, g)
     from vcam_cli.image_formation.spot_average import spot_averages
 
     both = axes(path, scene, 1.0)
@@ -240,13 +239,13 @@ def _spectral_layers(
     least = max((part.nyquist(g) for part in rings), default=LOWEST)
     sampled = int((~closed_planes(path, scene, mixing[0])).sum())
     needed = partial(memory_model.image_bytes, path, scene, highest, sampled, rings)
-    memory.require(needed(least), g.rows, g.columns)
+    memory_model.require(needed(least), g)
     image = sampled_image(path, scene, highest, mixing, least)
     size = table_size(path, image.highest)
     # A layer's image is held beside those of others, counted by the highest frequency.
     filtered = highest if path.has_opacity else image.highest
     total = needed(filtered) + memory_model.table_bytes(path, len(mixing[0]), size)
-    memory.require(total, g.rows, g.columns)
+    memory_model.require(total, g)
     modes: tuple[Mode, ...] = ()
     if field_rings:
         tables, modes = tabulate_field(exact, field_rings, g, size, mixing)

@@ -13,12 +13,12 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from vcam_cli import memory
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
 from vcam_cli.effects.pixel_signal import Transport
 from vcam_cli.image_formation import photon_rate
+from vcam_cli.image_formation.estimates import memory_model
 from vcam_cli.image_formation.estimates.light_cost import expected_report
 from vcam_cli.image_formation.light_plan import light_plan
 from vcam_cli.simulation.exposed_light import ExposedLight, expose
@@ -126,7 +126,7 @@ def estimated_light(
     whole = plan.reduced(seen.path)
     expected = expected_report(whole, seen.scene, whole.effects)
     geometry = seen.solved.geometry
-    memory.require(expected.memory, geometry.rows, geometry.columns)
+    memory_model.require(expected.memory, geometry)
     few = scene_light(coarse, picture, run.unseen())
     # The wide aperture replaces the photodetector's, whether that one is skipped or not.
     path = replace(plan.reduced(few.path), optional=())

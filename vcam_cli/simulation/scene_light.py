@@ -8,7 +8,6 @@ from functools import partial
 
 import numpy as np
 
-from vcam_cli import memory
 from vcam_cli.arrays import Array
 from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.pixel_signal import ColumnSpread, NeighborSharing, TemporalGain, Transport
@@ -423,7 +422,7 @@ def _require_memory(solved: Solved) -> int:
         on_screen,
         np.dtype(exposure.codes_type(solved.chain.adc.bits)).itemsize,
     )
-    memory.require(needed, array.rows, array.columns)
+    memory_model.require(needed, array)
     return needed
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from vcam_cli import memory
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.blurs import INTERPOLATION, PlaneTransfer
@@ -58,6 +59,24 @@ TABLES = transfer_functions.KEPT + transfer_tables.KEPT + power_spectrum.KEPT
 SCATTERED = 120
 """Pixel at a place of its own: positions, samples by color, the tree in which its neighbors are
 found [bytes]."""
+
+
+def require(needed: int, geometry: Geometry) -> None:
+    """Refuse a frame that takes more memory than is free, beyond what the process holds before it.
+
+    Parameters
+    ----------
+    needed : int
+        Memory of the frame, as the functions below forecast it [bytes].
+    geometry : Geometry
+        Geometry of the array, for the message.
+
+    Raises
+    ------
+    CannotDo
+        Where that does not fit.
+    """
+    memory.require(needed - BASE, geometry.rows, geometry.columns)
 
 
 def image_bytes(
