@@ -239,7 +239,7 @@ def test_what_is_lost_next_to_a_cutoff_is_never_understated(name):
     every = np.square(amplitudes(plane[0], x, y)[0] * (1 - x.frequencies / top))
     for frequency in power.x.high[:-1]:
         exact = np.sqrt(every[x.frequencies > frequency * (1 + 1e-9)].sum())
-        told = power.tail_rms(squares, frequency / NYQUIST, (PITCH, PITCH))
+        told = power.tails(squares, (PITCH, PITCH)).rms(frequency / NYQUIST)
         assert exact <= told * (1 + 1e-6)
 
 
@@ -282,12 +282,12 @@ def test_rms_beyond_a_frequency(name):
         return sum(np.sqrt(inside[zone == z].sum()) for z in np.unique(zone))
 
     for frequency in (0.0, 0.2, 0.7, 1.0):
-        found = power.tail_rms(squares, frequency, (PITCH, PITCH))
+        found = power.tails(squares, (PITCH, PITCH)).rms(frequency)
         # a block counts as its highest frequency does: never less than what lies beyond
         wider = in_phase(frequency * (1 - 2 * module.WIDTH) - 1e-9)
         exact = np.sqrt(every[shell > frequency * (1 + 1e-9)].sum())
         assert exact * (1 - 2e-3) <= found <= wider * (1 + 0.02)
-    assert power.tail_rms(squares, 3.0, (PITCH, PITCH)) == 0
+    assert power.tails(squares, (PITCH, PITCH)).rms(3.0) == 0
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -306,7 +306,7 @@ def test_what_pixels_see_beyond_a_frequency_is_at_most_as_told(seed):
     for frequency in (0.3, 0.8, 1.0, 1.7):
         beyond = terms * (shell > frequency * (1 + 1e-9))
         seen = waves_at_pixels(y) @ beyond @ waves_at_pixels(x).T
-        told = power.tail_rms(squares, frequency, (PITCH, PITCH))
+        told = power.tails(squares, (PITCH, PITCH)).rms(frequency)
         assert rms(seen) <= told * (1 + 2e-3)
 
 
@@ -322,12 +322,12 @@ def test_the_highest_that_is_needed_leaves_no_more_than_the_budget(pitch):
     x, y = AXES["squares below it"]
     power = power_spectrum(transform_planes(planes_of(x, y), 1), x, y, (), 1)
     squares = power.filtered_power(lens(np.exp(-3 * np.linspace(0, 1, 500))[None, None]))
-    whole = power.tail_rms(squares, -1.0, pitch)
+    whole = power.tails(squares, pitch).rms(-1.0)
     for part in (0.9, 0.5, 0.1, 0.01, 1e-9):
-        needed = power.needed_frequency(squares, part * whole, pitch)
-        assert power.tail_rms(squares, needed, pitch) <= part * whole
-        assert power.tail_rms(squares, needed * (1 - 1e-6), pitch) > part * whole
-    assert power.needed_frequency(squares, 1.01 * whole, pitch) == 0.0
+        needed = power.tails(squares, pitch).needed_frequency(part * whole)
+        assert power.tails(squares, pitch).rms(needed) <= part * whole
+        assert power.tails(squares, pitch).rms(needed * (1 - 1e-6)) > part * whole
+    assert power.tails(squares, pitch).needed_frequency(1.01 * whole) == 0.0
 
 
 def test_the_color_of_most_decides():
@@ -338,8 +338,8 @@ def test_the_color_of_most_decides():
     squares = power.filtered_power(Tables(np.eye(1), np.array([[soft, sharp]]), 2 * NYQUIST, 0.0))
     pitch = PITCH, PITCH
     for frequency in (0.0, 1.0):
-        each = [power.tail_rms(squares[c : c + 1], frequency, pitch) for c in (0, 1)]
-        assert power.tail_rms(squares, frequency, pitch) == pytest.approx(max(each))
+        each = [power.tails(squares[c : c + 1], pitch).rms(frequency) for c in (0, 1)]
+        assert power.tails(squares, pitch).rms(frequency) == pytest.approx(max(each))
 
 
 def test_power_of_rectangles_is_that_of_their_cells():

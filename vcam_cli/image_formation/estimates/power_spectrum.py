@@ -203,10 +203,11 @@ class PowerSpectrum:
         for parity in tables.parities:
             values = (read or _values)(tables, parity, self.x, self.y, place)
             for (r, s), squares in zip(self.pairs, self.products, strict=True):
-                for color in np.flatnonzero(tables.is_seen[r] & tables.is_seen[s]):
-                    both = values[r, color] * values[s, color]
-                    both *= squares
-                    power[color] += both
+                seen = tables.is_seen[r] & tables.is_seen[s]
+                colors = slice(None) if seen.all() else np.flatnonzero(seen)
+                both = values[r, colors] * values[s, colors]
+                both *= squares
+                power[colors] += both
         return np.maximum(power, 0)
 
     def upper_bound(self, tables: Tables) -> Array:
@@ -257,55 +258,23 @@ class PowerSpectrum:
             along_y *= _largest_squares(effect.along_y, self.y)
         return np.outer(along_y, along_x)
 
-    def needed_frequency(self, power: Array, budget: float, pitch: tuple[float, float]) -> float:
-        """Return the frequency beyond which little enough is left.
-
-        That of a term is the larger of those along both axes, each in its own Nyquist frequency.
-
-        Parameters
-        ----------
-        power : Array
-            Mean squares (C, ...) from `largest_power` or `upper_bound` [(e/s)^2].
-        budget : float
-            Rms that may be left at the pixels [e/s].
-        pitch : tuple of float
-            Pixel pitch along y and x [m].
-
-        Returns
-        -------
-        float
-            Frequency [pixel Nyquist].
-        """
-        frequency, left = self._left_beyond(power, pitch)
-        needed = np.flatnonzero(left.max(axis=0) > budget)
-        return float(frequency[needed[-1]]) if len(needed) else 0.0
-
-    def tail_rms(self, power: Array, frequency: float, pitch: tuple[float, float]) -> float:
-        """Return the rms of all that lies beyond a frequency, in the color of most.
-
-        Parameters
-        ----------
-        power : Array
-            Mean squares (C, ...) from `largest_power` or `upper_bound` [(e/s)^2].
-        frequency : float
-            Frequency [pixel Nyquist].
-        pitch : tuple of float
-            Pixel pitch along y and x [m].
-
-        Returns
-        -------
-        float
-            Rms at the pixels, at most [e/s].
-        """
-        every, left = self._left_beyond(power, pitch)
-        beyond = int(np.searchsorted(every, frequency * (1 + 1e-9), side="right"))
-        return float(left[:, beyond].max()) if beyond < left.shape[1] else 0.0
-
-    def _left_beyond(self, power: Array, pitch: tuple[float, float]) -> tuple[Array, Array]:
-        """Return frequencies (n,) [pixel Nyquist], and the signal from each on, rms (C, n).
+    def tails(self, power: Array, pitch: tuple[float, float]) -> Tails:
+        """Return what lies beyond each frequency.
 
         Pixels cannot tell apart a term of each zone between multiples of their Nyquist frequency:
         within a zone mean squares add up, those of zones as if all of them met in phase.
+
+        Parameters
+        ----------
+        power : Array
+            Mean squares (C, ...) from `largest_power` or `upper_bound` [(e/s)^2].
+        pitch : tuple of float
+            Pixel pitch along y and x [m].
+
+        Returns
+        -------
+        Tails
+            Rms at the pixels, at most.
         """
         frequency, bins, zones = _shells(self.x, self.y, pitch)
         size = zones * len(frequency)
@@ -313,7 +282,53 @@ class PowerSpectrum:
         for color in power.reshape(len(power), -1):
             of_zones = np.bincount(bins, color, size).reshape(-1, len(frequency))
             left.append(np.sqrt(np.cumsum(of_zones[:, ::-1], axis=1)[:, ::-1]).sum(axis=0))
-        return frequency, np.array(left)
+        return Tails(frequency, np.array(left).max(axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class Tails:
+    """What of a spectrum lies beyond each frequency, in the color of most.
+
+    The frequency of a term is the larger of those along both axes, each in its own Nyquist
+    frequency.
+    """
+
+    frequency: Array
+    """Frequencies (n,), rising [pixel Nyquist]."""
+    left: Array
+    """Rms at the pixels of what lies at each and beyond (n,) [e/s]."""
+
+    def needed_frequency(self, budget: float) -> float:
+        """Return the frequency beyond which little enough is left.
+
+        Parameters
+        ----------
+        budget : float
+            Rms that may be left at the pixels [e/s].
+
+        Returns
+        -------
+        float
+            Frequency [pixel Nyquist].
+        """
+        needed = np.flatnonzero(self.left > budget)
+        return float(self.frequency[needed[-1]]) if len(needed) else 0.0
+
+    def rms(self, frequency: float) -> float:
+        """Return the rms of all that lies beyond a frequency.
+
+        Parameters
+        ----------
+        frequency : float
+            Frequency [pixel Nyquist].
+
+        Returns
+        -------
+        float
+            Rms at the pixels, at most [e/s].
+        """
+        beyond = int(np.searchsorted(self.frequency, frequency * (1 + 1e-9), side="right"))
+        return float(self.left[beyond]) if beyond < len(self.left) else 0.0
 
 
 def _values(tables: Tables, parity: int, x: Blocks, y: Blocks, place: int) -> Array:

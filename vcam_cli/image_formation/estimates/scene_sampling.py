@@ -160,11 +160,11 @@ def sampled_image(
         if directed
         else power.pixel_power(largest)
     )
-    pitch = g.pitch_y, g.pitch_x
+    tails = power.tails(squares, (g.pitch_y, g.pitch_x))
     density = math.prod(scene.extent) / (g.sensor_width * g.sensor_height)
     if knobs.oversampling is None:
         budget = FREQUENCY_SHARE * knobs.tolerance * path.full / math.sqrt(density * path.scatter)
-        needed = power.needed_frequency(squares, budget, pitch) * (1 + 1e-9)
+        needed = tails.needed_frequency(budget) * (1 + 1e-9)
         highest = min(max(needed, least), highest)
     else:
         highest = min(highest, knobs.oversampling)
@@ -178,7 +178,7 @@ def sampled_image(
         tables=tables,
         lens_power=lens_power,
         highest=highest,
-        lost_rms=float(np.sqrt(density)) * power.tail_rms(squares, highest, pitch),
+        lost_rms=float(np.sqrt(density)) * tails.rms(highest),
         peak=peak,
         density=density,
     )
