@@ -7,6 +7,7 @@ Keys laid over the name of a part change that part.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from vcam_cli import errors
 from vcam_cli.config.yaml_tree import Key, Node, child_path
@@ -20,6 +21,11 @@ class Alternatives:
     groups: tuple[frozenset[Key], ...]
     path: errors.Path | None = None
     """Path of the only mapping that they are keys of; None for any mapping."""
+
+    @cached_property
+    def keys(self) -> frozenset[Key]:
+        """All keys of the groups."""
+        return frozenset().union(*self.groups)
 
     @classmethod
     def parse(cls, text: str, path: errors.Path | None = None) -> "Alternatives":
@@ -102,9 +108,10 @@ def _remaining_entries(
             return {k: base[k] for k in telling[:i] if k in base}
     dropped: set[Key] = set()
     for alternatives in rules.alternatives:
+        if alternatives.path not in (None, path) or alternatives.keys.isdisjoint(over):
+            continue
         given = [group for group in alternatives.groups if group & over.keys()]
-        if given and alternatives.path in (None, path):
-            dropped |= frozenset().union(*alternatives.groups) - frozenset().union(*given)
+        dropped |= alternatives.keys - frozenset().union(*given)
     for key, following in rules.determines.items():
         if key in over and over[key].value not in (None, "none"):
             dropped |= following

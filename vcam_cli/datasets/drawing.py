@@ -197,13 +197,19 @@ def _draw(model: Dataset, path: str, drawn: Distribution, index: int, above: dic
     share = float(generator.random())
     ends = drawn.uniform or drawn.log_uniform
     assert ends is not None
-    first, unit = units.split(ends[0])
-    low, high = float(first), float(units.convert(*units.split(ends[1]), unit))
+    low, high, unit = _ends(*ends)
     number = low + (high - low) * share
     if drawn.log_uniform is not None:
         number = math.exp(math.log(low) + (math.log(high) - math.log(low)) * share)
     number = float(f"{number:.{DIGITS}g}")
     return f"{number!r} {unit}" if unit else number
+
+
+@lru_cache(1 << 6)
+def _ends(first: str | float, last: str | float) -> tuple[float, float, str]:
+    """Return the ends of an interval and their unit."""
+    low, unit = units.split(first)
+    return float(low), float(units.convert(*units.split(last), unit)), unit
 
 
 def _computed(model: Dataset, path: str, values: dict[str, Any], factor: float = 1.0) -> Any:

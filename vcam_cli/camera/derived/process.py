@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, TypeVar, get_args
 
 from vcam_cli.camera.model import CameraModel
@@ -129,7 +130,7 @@ def process(camera: CameraModel) -> Process:
     Raises BadInput where its technology could not be read, or is too far from the feature size.
     """
     choice, detector = camera.pixel.technology, camera.pixel.photodetector
-    numbers = Numbers() if choice is None else _numbers(choice)
+    numbers = _no_numbers() if choice is None else _numbers(choice)
     junction = numbers.junction
     if detector.kind == "nwell-psub":
         junction = junction.model_copy(update=dict(numbers.well))
@@ -177,6 +178,12 @@ def _example(key: str, bare: bool) -> object:
         kind = model.model_fields[section].annotation
         model = next(iter(get_args(kind)), kind)
     return model.model_fields[name].examples[0]
+
+
+@cache
+def _no_numbers() -> Numbers:
+    """Return what a camera without a technology has: to make it takes most of `process`."""
+    return Numbers()
 
 
 def _numbers(choice: TechnologyChoice) -> Technology:
