@@ -176,14 +176,15 @@ def test_failing_rays_are_counted_with_their_field(monkeypatch):
     height, lost = blur.failing[-1]
     assert height == pytest.approx(blur.half_diagonal)
     rng = np.random.default_rng(1)
-    radius, azimuth = np.sqrt(rng.random(4000)), 2 * np.pi * rng.random(4000)
+    radius, azimuth = np.sqrt(rng.random(20_000)), 2 * np.pi * rng.random(20_000)
     angle = blur.view.angle_of(np.array([height]))
     waves = np.array([500e-9])
     u, v = blur.view.aim(angle, waves, radius * np.cos(azimuth), radius * np.sin(azimuth))
     chief = blur.view.chief(angle, waves)
     front = blur.view.wavefront(angle, waves, u, v, chief)
     alive = front.alive & np.isfinite(front.path)
-    assert lost == pytest.approx(1 - alive.mean(), abs=5 * math.sqrt(lost / 4000) + 0.02)
+    # A grid of the pupil counts its border to 3 % of them.
+    assert lost == pytest.approx(1 - alive.mean(), abs=5 * math.sqrt(lost / 20_000) + 0.03 * lost)
     # The blur itself is not needed: 40 s, for such rays land far from each other. Nor is what it
     # would change, which the plan tells: 2 s.
     monkeypatch.setattr(TracedBlur, "mean_error", lambda *_: 1.0)
