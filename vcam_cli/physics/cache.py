@@ -42,15 +42,21 @@ def remembered(
 
         @wraps(function)
         def call(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Returned:
-            try:
-                hash((args, tuple(kwargs.values())))
-            except TypeError:
+            if not _has_hash((args, tuple(kwargs.values()))):
                 return function(*args, **kwargs)
             return kept(*args, **kwargs)  # type: ignore[arg-type]  # they have a hash
 
         return call
 
     return decorate
+
+
+def _has_hash(key: object) -> bool:
+    try:
+        hash(key)
+    except TypeError:
+        return False
+    return True
 
 
 class ByteCache(Generic[T]):
@@ -87,9 +93,7 @@ class ByteCache(Generic[T]):
         T
             The result.
         """
-        try:
-            hash(key)
-        except TypeError:
+        if not _has_hash(key):
             return compute()
         with self._lock:
             if key in self._kept:
