@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import glob
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from pathlib import Path
 
 from vcam_cli.camera import load as cameras
@@ -40,6 +40,8 @@ def _refuse_others(root: Node) -> None:
 
 
 FORMAT = FileFormat(model=Dataset, kind="studies", refuse=_refuse_others)
+KEPT_FRAMES = 1 << 12
+"""Drawn frames that are kept, 4 MB: each is asked for when work is divided, done and listed."""
 
 
 @dataclass(frozen=True)
@@ -58,9 +60,10 @@ class DatasetFile:
         """The camera before anything is drawn."""
         return self.base.validate(CHECKS)
 
-    def frame(self, number: int) -> Frame:
-        """Return a frame, by its number from 0."""
-        return draw_frame(self.model, self.scenes, number)
+    @cached_property
+    def frame(self) -> Callable[[int], Frame]:
+        """Returns a frame, by its number from 0."""
+        return lru_cache(KEPT_FRAMES)(partial(draw_frame, self.model, self.scenes))
 
     def cameras(self) -> Iterator[Camera]:
         """Yield cameras with each end of what is drawn. Raises BadInput with all mistakes."""
