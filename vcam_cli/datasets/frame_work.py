@@ -232,8 +232,9 @@ def noise_labels(
     circuit, gain = solved.electrical, chain.system_gain
     dark = mean_dark(seconds, effects)
     sources = of_kind(effects, NoiseSource)
-    rms = {f"{source.name} [e]": source.variance(dark, dark) ** 0.5 for source in sources}
-    temporal = sum(s.variance(dark, dark) for s in sources if s.scope == "frame")
+    variances = [source.variance(dark, dark) for source in sources]
+    rms = {f"{s.name} [e]": own**0.5 for s, own in zip(sources, variances, strict=True)}
+    temporal = sum(own for s, own in zip(sources, variances, strict=True) if s.scope == "frame")
     fpn = solved.pixel.fpn
     return {
         "exposure_time [s]": seconds,

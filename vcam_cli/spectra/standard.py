@@ -25,6 +25,7 @@ from pathlib import Path
 
 import numpy as np
 
+from vcam_cli.physics.cache import remembered
 from vcam_cli.spectra.integration import integral
 from vcam_cli.spectra.spectrum import Floats, Outside, Spectrum, Table
 from vcam_cli.spectra.text import read_rows
@@ -213,6 +214,7 @@ def silicon_absorption() -> Table:
     return Table(wavelength, 100 * columns["absorption_per_cm"], "error")
 
 
+@remembered(16)
 def luminance(spectral_radiance: Spectrum, start: float, stop: float) -> float:
     """Return the luminance of a spectral radiance.
 
