@@ -92,6 +92,8 @@ class OpticalPath:
     """Whether it is that of a layer, half of whose colors are its opacity."""
     device: Processor = PROCESSOR
     """Where sampled scenes are transformed, filtered and evaluated at the pixels."""
+    is_mosaic: bool = False
+    """Whether each pixel needs its own color alone: layers are then composed in that color."""
     is_explained: bool = True
     """Whether the report says what each transfer function changes: 3 % of a frame of 64 x 64
     pixels of a data set, which needs no plan."""
@@ -240,6 +242,74 @@ class Layer:
     """From a color and array rows to its signal there, (rows, columns) [electrons / s]."""
     weight: Callable[[Array, Array], Array] | None = None
     """A factor at the positions x (columns,), y (rows,) [m]: (rows, columns); None for 1."""
+
+    def from_color(self, first: int) -> Layer:
+        """Return the layer with another one as its first color."""
+        if not first:
+            return self
+        return replace(self, values=lambda color, rows: self.values(first + color, rows))
+
+    def scaled(self, scales: Array) -> Layer:
+        """Return the layer over a scale (C,) of each color."""
+        return replace(self, values=lambda color, rows: self.values(color, rows) / scales[color])
+
+    def fill(
+        self, tile: Array, mosaic: Mosaic, rows: slice, first: tuple[int, int] = (0, 0)
+    ) -> None:
+        """Put the signal of rows where it belongs: every color in its plane, or in its pixels.
+
+        Parameters
+        ----------
+        tile : Array
+            What is filled, (C, rows, columns), or (1, rows, columns) with each pixel in its own
+            color; places without a pixel are left alone [e/s].
+        mosaic : Mosaic
+            Colors of the pixels.
+        rows : slice
+            Rows of the layer.
+        first : tuple of int, optional
+            Row and column of the array where the layer begins.
+        """
+        if len(tile) > 1:
+            for color, plane in enumerate(tile):
+                plane[:] = self.values(color, rows)
+            return
+        period = len(mosaic.block)
+        for phase in range(min(period, tile.shape[1])):
+            row = rows.start + phase
+            for color, places in mosaic.row_colors(first[0] + row, first[1]):
+                found = self.values(color, slice(row, rows.stop, period))
+                for columns in places:
+                    tile[0, phase::period, columns] = found[:, columns]
+
+    def add(
+        self,
+        out: Array,
+        mosaic: Mosaic,
+        rows: slice,
+        place: tuple[Array, Array],
+        first: tuple[int, int] = (0, 0),
+        is_alone: bool = False,
+    ) -> None:
+        """Add the signal of rows, times its weight.
+
+        Parameters are those of `fill`, and:
+
+        Parameters
+        ----------
+        place : tuple of Array
+            Positions x (columns,) and y (rows,) of these rows [m].
+        is_alone : bool, optional
+            Whether nothing was added before.
+        """
+        if is_alone and self.weight is None:
+            self.fill(out, mosaic, rows, first)
+            return
+        tile = np.zeros_like(out)
+        self.fill(tile, mosaic, rows, first)
+        if self.weight is not None:
+            tile *= self.weight(*place)
+        out += tile
 
 
 Layers = Iterator[Layer]

@@ -121,7 +121,7 @@ def photo_rate(path: OpticalPath, scene: AnyScene, planes: bool = False) -> Rate
         Where memory does not suffice.
     """
     plan = light_plan(path, scene)
-    path = plan.reduced(path)
+    path = replace(plan.reduced(path), is_mosaic=not planes)
     while True:
         with path.device.errors():
             found = _gathered(path, scene, planes)
@@ -161,14 +161,7 @@ def _gathered(path: OpticalPath, scene: AnyScene, planes: bool) -> Rate:
             _attenuate(out[:, block], effect, (x, y[block]), mosaic, block.start, on_axis[effect])
 
     def add(layer: Layer, first: bool, block: slice) -> None:
-        if first and layer.weight is None:
-            _fill(out[:, block], layer, mosaic, block)
-            return
-        tile = np.zeros_like(out[:, block])
-        _fill(tile, layer, mosaic, block)
-        if layer.weight is not None:
-            tile *= layer.weight(x, y[block])
-        out[:, block] += tile
+        layer.add(out[:, block], mosaic, block, (x, y[block]), is_alone=first)
 
     def finish(block: slice) -> None:
         np.maximum(out[:, block], 0, out=out[:, block])
@@ -191,21 +184,6 @@ def _glares_and_gains(
     glares = of_kind(effects, VeilingGlare)
     ends = [0, *(effects.index(glare) for glare in glares), len(effects)]
     return glares, [of_kind(effects[start:stop], Gain) for start, stop in pairwise(ends)]
-
-
-def _fill(tile: Array, layer: Layer, mosaic: Mosaic, block: slice) -> None:
-    """Put a layer's light where it belongs: every color in its plane, or each in its places."""
-    if len(tile) > 1:
-        for color, plane in enumerate(tile):
-            plane[:] = layer.values(color, block)
-        return
-    period = len(mosaic.block)
-    for phase in range(min(period, tile.shape[1])):
-        row = block.start + phase
-        for color, places in mosaic.row_colors(row):
-            found = layer.values(color, slice(row, block.stop, period))
-            for columns in places:
-                tile[0, phase::period, columns] = found[:, columns]
 
 
 def _attenuate(

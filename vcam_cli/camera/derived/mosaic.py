@@ -40,11 +40,11 @@ class Mosaic:
         """Colors in the order of channels: R, G, B first, others by first appearance."""
         return channel_order(c for row in self.block for c in row if c != NONE)
 
-    def row_colors(self, row: int) -> Iterator[tuple[int, list[slice]]]:
-        """Yield every color of an array row: its index, and its columns."""
+    def row_colors(self, row: int, first: int = 0) -> Iterator[tuple[int, list[slice]]]:
+        """Yield every color of an array row: its index, and its columns, from the first one on."""
         line = self.block[row % len(self.block)]
         for color in dict.fromkeys(name for name in line if name != NONE):
-            at = [offset for offset, name in enumerate(line) if name == color]
+            at = [(n - first) % len(line) for n, name in enumerate(line) if name == color]
             yield self.colors.index(color), [slice(offset, None, len(line)) for offset in at]
 
     def color_at(self, rows: Array, columns: Array) -> Array:

@@ -352,7 +352,8 @@ def composed_bytes(path: OpticalPath, layers: int, rays: int) -> int:
         bounds; then the rays.
     """
     pixels = path.geometry.rows * path.geometry.columns
-    width, colors = path.settings.float_width // 8, len(path.mosaic.colors)
+    width = path.settings.float_width // 8
+    colors = 1 if path.is_mosaic else len(path.mosaic.colors)
     held = layers + (2 * colors + 3) * pixels * width
     work = max(round(SLACK * rays), work_bytes(pixels, path.workers))
     return BASE + round(SLACK * held) + work

@@ -27,8 +27,10 @@ from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.blurs import Blur, SeparableTransfer
 from vcam_cli.effects.optics.paraboloid import Paraboloid
 from vcam_cli.effects.optics.wavefront_blur import AberrationBlur
-from vcam_cli.image_formation.layers.layered import gathered, is_of_lens
+from vcam_cli.image_formation.layers.gathering import Pixels
+from vcam_cli.image_formation.layers.layered import is_of_lens
 from vcam_cli.image_formation.layers.ray_composition import composed, ray_correction
+from vcam_cli.image_formation.layers.ray_cells import Window
 from vcam_cli.image_formation.optical_path import (
     CutReport,
     Layer,
@@ -81,18 +83,18 @@ def cut_image(
         own = _layer_path(path, optics, len(used))
         parts, report = form(own, layer)
         reports.append(report)
-        like: Array = np.empty((len(own.mosaic.colors), 0), own_type)
-        both = gathered(parts, path.geometry, like)
+        both = pixels.gathered(parts, kinds=2)
         if slope is not None:
             parts, report = form(_layer_path(path, _with_paraboloid(optics), len(used)), slope)
             reports.append(report)
-            both += gathered(parts, path.geometry, like)
-        colors = len(both) // 2
-        level = own.transfer.level[-1, colors:, None, None]
-        cover = both[colors:] / np.where(level > 0, level, 1.0).astype(own_type)
-        return both[:colors], np.clip(cover, 0, 1, out=cover)
+            both += pixels.gathered(parts, kinds=2)
+        light, cover = both
+        level = own.transfer.level[-1, len(light) :, None, None]
+        cover /= np.where(level > 0, level, 1.0).astype(cover.dtype)
+        return light, np.clip(cover, 0, 1, out=cover)
 
-    own_type = path.settings.dtype
+    g = path.geometry
+    pixels = Pixels(replace(path, is_mosaic=False), Window(slice(0, g.rows), slice(0, g.columns)))
     shown = (formed(scene.shown(n), path.layers[n], scene.sloped(n)) for n in used)
     hidden_layers = ((scene.hidden(number), path.layers[number]) for number in used)
     hidden = (formed(layer, optics) for layer, optics in hidden_layers if layer is not None)

@@ -29,6 +29,7 @@ from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.floats import rms
 from vcam_cli.image_formation.estimates import memory_model
 from vcam_cli.image_formation.estimates.bandwidth import fast_margin_around, margin
+from vcam_cli.image_formation.layers.gathering import Pixels
 from vcam_cli.image_formation.layers.layer_edges import (
     even_motion,
     moves_otherwise,
@@ -54,7 +55,6 @@ from vcam_cli.image_formation.optical_path import (
     SpectrumReport,
 )
 from vcam_cli.image_formation.transfer_functions import Transfer
-from vcam_cli.parallel import pieces, rows_at_once
 from vcam_cli.scenes import discs
 from vcam_cli.scenes.base import ChartScene, PaintedCells
 from vcam_cli.scenes.image import ImageScene
@@ -92,9 +92,10 @@ class SeenLayer:
     window: Window
     """Pixels that its light reaches."""
     light: Array
-    """Light (C, rows, columns) in the window [e/s]."""
+    """Light (C, rows, columns) in the window [e/s]; of a mosaic (1, rows, columns), as all that is
+    composed."""
     cover: Array
-    """Opacity (C, rows, columns)."""
+    """Opacity, likewise."""
     path: OpticalPath
     beyond: tuple[int, int]
     """Rows and columns by which its chart goes on beyond the window."""
@@ -171,7 +172,7 @@ def layered_image(
         left_out=left_out * over_full,
         ray_values=hidden.values,
     )
-    layer = Layer(lambda color, rows: light[color, rows])
+    layer = Layer(lambda color, rows: light[0 if path.is_mosaic else color, rows])
     kept = min(discs.asked_bytes() - asked, discs.KEPT)
     sources = {id(own): own.nbytes for part in scene.parts for own in part.chart.sources}
     kept += sum(sources.values()) + memory_model.TABLES
@@ -189,13 +190,13 @@ def _layers_seen(path: OpticalPath, scene: LayeredScene, form: FormImage) -> Ite
         seen = _layer_path(path, part, effects, scene.brightest, hides, share)
         if seen is not None:
             window, own, beyond, is_cut = seen
-            center = window.center(path.geometry)
-            light, cover, report = _light_and_cover(own, part, center, beyond, scene.white, form)
+            pixels = Pixels(path, window)
+            light, cover, report = _light_and_cover(own, part, pixels, beyond, scene.white, form)
             cut_rms = 0.0
             if is_cut:  # the tail of a line is halved by a margin twice as wide
                 halves = beyond[0] // 2, beyond[1] // 2
-                half = _light_and_cover(own, part, center, halves, scene.white, form)
-                level = scene.brightest * path.transfer.level[-1, :, None, None]
+                half = _light_and_cover(own, part, pixels, halves, scene.white, form)
+                level = scene.brightest * float(path.transfer.level[-1].max())
                 changed = np.abs(light - half[0]) + level * np.abs(cover - half[1])
                 cut_rms = rms(changed)
             yield SeenLayer(number, window, light, cover, own, beyond, report, cut_rms)
@@ -204,15 +205,15 @@ def _layers_seen(path: OpticalPath, scene: LayeredScene, form: FormImage) -> Ite
 def _composed(
     path: OpticalPath, scene: LayeredScene, layers: Sequence[SeenLayer]
 ) -> tuple[Array, Array, Array]:
-    """Return the light (C, rows, columns) of layers one before the other [e/s].
+    """Return the light (C or 1, rows, columns) of layers one before the other [e/s].
 
     And two bounds (rows, columns) on what is missing from it in the color where it is most: of the
     lights that rays of a pixel may see behind layers, and as if these were black and the brightest
     everywhere [e/s].
     """
     g, white = path.geometry, float(path.transfer.level[-1].max())
-    colors = len(path.transfer.weights[-1])
-    total: Array = np.zeros((colors, g.rows, g.columns), path.settings.dtype)
+    planes = Pixels(path, Window(slice(0, g.rows), slice(0, g.columns))).planes
+    total: Array = np.zeros((planes, g.rows, g.columns), path.settings.dtype)
     clear, bound, widest = np.ones_like(total[0]), np.zeros_like(total[0]), np.zeros_like(total[0])
     far = WIDEST_BORDER * max(g.pitch_x, g.pitch_y)
     spread = spread_behind(g, scene.parts, path.layers, path.transfer.level, far, SIDE)
@@ -307,40 +308,6 @@ def _painting_bytes(path: OpticalPath, scene: LayeredScene, cells: Cells) -> int
     return max(part.chart.painting_bytes(painted) for part in scene.parts)
 
 
-def gathered(
-    layers: Layers, g: Geometry, like: Array, at: tuple[float, float] = (0.0, 0.0)
-) -> Array:
-    """Return the sum of parts of an image.
-
-    Parameters
-    ----------
-    layers : Layers
-        Parts of the image, with their weights.
-    g : Geometry
-        Geometry of the array.
-    like : Array
-        Rates (C, ...), which set the number of colors and the float type [e/s].
-    at : tuple of float, optional
-        Position (x, y) of the center of `g` [m].
-
-    Returns
-    -------
-    Array
-        Sum (C, rows, columns) [e/s].
-    """
-    out: Array = np.zeros((len(like), g.rows, g.columns), like.dtype)
-    columns, rows = pixel_centers(g)
-    for layer in layers:
-        for some in pieces(g.rows, rows_at_once(g.columns)):
-            place = columns + at[0], rows[some] + at[1]
-            weight = None if layer.weight is None else layer.weight(*place)
-            for color, plane in enumerate(out):
-                found = layer.values(color, some)
-                plane[some] += found if weight is None else found * weight
-        del layer  # its series is not held beside the next one
-    return out
-
-
 def _layers_over_array(g: Geometry, scene: LayeredScene) -> float:
     """Return the area of all layers on the array over its own; 1 where they are less."""
     pixels = sum(math.prod(_window(g, part, 0.0).pixels) for part in scene.parts)
@@ -403,16 +370,16 @@ def _layer_path(
 def _light_and_cover(
     path: OpticalPath,
     part: LayerPart,
-    center: tuple[float, float],
+    pixels: Pixels,
     beyond: tuple[int, int],
     white: Spectrum,
     form: FormImage,
 ) -> tuple[Array, Array, SpectrumReport]:
-    """Return a layer's light [e/s] and opacity (C, rows, columns) around a place on the array [m].
+    """Return a layer's light [e/s] and opacity (C or 1, rows, columns) at pixels.
 
     The opacity of one that hides nothing is 1.
     """
-    g, (at_x, at_y) = path.geometry, center
+    g, (at_x, at_y) = path.geometry, pixels.center
     x, y = part.chart.center
     chart = replace(part.chart, center=(x - at_x, y - at_y))
     scene = ChartScene(
@@ -426,18 +393,15 @@ def _light_and_cover(
         chart=chart,
     )
     layers, report = form(path, scene)
-    planes: Array = np.empty((len(path.mosaic.colors), 0), path.settings.dtype)
-    both = gathered(layers, g, planes, center)
     if not path.has_opacity:
-        return (
-            np.maximum(both, 0, out=both),
-            np.broadcast_to(both.dtype.type(1), both.shape),
-            report,
-        )
-    colors = len(both) // 2
-    level = path.transfer.level[-1, colors:, None, None]
-    light, cover = both[:colors], both[colors:]
-    cover /= np.where(level > 0, level, 1.0).astype(cover.dtype)
+        (light,) = pixels.gathered(layers)
+        np.maximum(light, 0, out=light)
+        return light, np.broadcast_to(light.dtype.type(1), light.shape), report
+    colors = len(path.mosaic.colors) // 2
+    white_level = path.transfer.level[-1]
+    scales: Array = np.where(white_level > 0, white_level, 1.0).astype(path.settings.dtype)
+    scales[:colors] = 1
+    light, cover = pixels.gathered((own.scaled(scales) for own in layers), kinds=2)
     return np.maximum(light, 0, out=light), np.clip(cover, 0, 1, out=cover), report
 
 

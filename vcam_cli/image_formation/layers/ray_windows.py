@@ -36,6 +36,7 @@ from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.effects.optics.shaped_blur import opening_of
 from vcam_cli.image_formation.estimates.bandwidth import line_spread_tail
+from vcam_cli.image_formation.layers.gathering import Pixels
 from vcam_cli.image_formation.layers.occlusion import RayLayer, covariance, covariance_bytes, rays
 from vcam_cli.image_formation.layers.ray_cells import BORDER, Cells, SharpImage, Window
 from vcam_cli.image_formation.optical_path import OpticalPath
@@ -170,7 +171,7 @@ class RaySum:
         Parameters
         ----------
         light : Array
-            Light (C, rows, columns) that is changed [e/s].
+            Light (C or 1, rows, columns) that is changed [e/s].
         windows : sequence of Window
             Windows that do not overlap.
         allowed : float
@@ -190,7 +191,8 @@ class RaySum:
             fine = results(self._refined, coarse, self.path.workers)
             sums = [one for one in sums if one not in coarse] + fine
         for one in sums:
-            light[:, one.window.rows, one.window.columns] += one.light
+            own = Pixels(self.path, one.window).own(one.light)
+            light[:, one.window.rows, one.window.columns] += own
         np.maximum(light, 0, out=light)
         most = max((one.memory for one in sums), default=0)
         memory = self.sharp.nbytes + sum(one.light.nbytes for one in sums)
