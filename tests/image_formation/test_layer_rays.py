@@ -98,9 +98,9 @@ def test_covariance_of_stripes_is_that_of_their_waves():
         ((own, light, cover),) = sums
         return light / len(own), cover[:, None] / len(own)
 
-    def met(at):
-        top, left = (reach + int(np.floor(offset)) for offset in at[::-1])
-        return slice(top, top + inner), slice(left, left + inner)
+    def met(offsets):
+        places = reach + np.floor(offsets).astype(int)
+        return [(slice(y, y + inner), slice(x, x + inner)) for x, y in places.tolist()]
 
     rays_of_one = [rays(4000, 0)]
     found = covariance([front, back], rays_of_one, (inner, inner), met, means)[0].mean()
@@ -202,7 +202,7 @@ def test_rays_meet_the_cells_that_they_lie_in(divided, offset):
     """Cells divide photodetectors, or whole pixels: also where gaps lie between them."""
     g, count = sensor(16, 16), 3
     cells = Cells(g, Window(slice(2, 7), slice(5, 9)), count, 0, (10, 10), divided=divided)
-    indices = cells.met(np.array(offset))
+    (indices,) = cells.met(np.array([offset]))
     for axis, (pixels, index) in enumerate(zip(((5, 9), (2, 7)), indices[::-1], strict=True)):
         edges, side = cells.edges()[axis], cells.sides[axis]
         middle = (np.arange(*pixels) - 7.5) * PIXEL_PITCH

@@ -19,7 +19,7 @@ from vcam_cli.scenes.closed_form import Profile
 from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, total_energy
 from vcam_cli.scenes.framed import chart_scene
-from vcam_cli.scenes.picture_chart import PictureChart
+from vcam_cli.scenes.picture_chart import Inside, PictureChart
 from vcam_cli.scenes.warped import SmoothMap, WarpedChart
 from vcam_cli.spectra import Spectrum
 
@@ -186,6 +186,40 @@ class LayerChart(Chart):
         own = (x[0] - center_x, x[1] - center_x), (y[0] - center_y, y[1] - center_y)
         return self.layer.light.value_ends(*own, mix)
 
+    def opacity_extremes(
+        self, x_edges: Array, y_edges: Array, size: tuple[int, int]
+    ) -> tuple[Array, Array]:
+        """Return bounds on the least and the largest opacity in windows of cells.
+
+        Parameters
+        ----------
+        x_edges, y_edges : Array
+            Edges of the cells (n + 1,) and (m + 1,), rising [m].
+        size : tuple of int
+            Rows and columns (k, l) of the windows.
+
+        Returns
+        -------
+        low, high : Array
+            Bounds (m - k + 1, n - l + 1).
+        """
+        layer = self.layer
+        if not (isinstance(layer, MaskedChart) and layer.opacity.is_even):
+            low, high = self.opacity_ends(x_edges, y_edges)
+            low, high = (
+                window_extremes(pick, plane, size)
+                for pick, plane in ((np.minimum, low), (np.maximum, high))
+            )
+            return low, high
+        columns, rows = layer.opacity.inside(x_edges - self.center[0], y_edges - self.center[1])
+        along = [
+            _extreme_shares(part, len(edges) - 1, count)
+            for part, edges, count in zip((rows, columns), (y_edges, x_edges), size, strict=True)
+        ]
+        (full_y, lit_y), (full_x, lit_x) = along
+        value = layer.opacity.picture[0, 0, 0]
+        return value * np.outer(full_y, full_x), value * np.outer(lit_y, lit_x)
+
     def opacity_ends(self, x_edges: Array, y_edges: Array) -> tuple[Array, Array]:
         """Return bounds on the least and the largest opacity in cells (rows, columns)."""
         x, y = x_edges - self.center[0], y_edges - self.center[1]
@@ -337,11 +371,11 @@ class FlatLayers(Chart):
         """
         edges = (x_edges, y_edges)
         if not any(self._are_pixels(np.diff(e)) for e in edges):
-            out[:] = self._compose(mix, lambda chart, m: chart.averages(x_edges, y_edges, m))
+            out[:] = self._compose(mix, lambda part, m: part.chart.averages(x_edges, y_edges, m))
             return
         borders = zip(*(p.chart.sample_borders(x_edges, y_edges) for p in self.parts), strict=True)
         x, y = (_divided(e, np.concatenate(b)) for e, b in zip(edges, borders, strict=True))
-        found = self._compose(mix, lambda chart, m: chart.averages(x, y, m))
+        found = self._compose(mix, lambda part, m: part.chart.averages(x, y, m))
         out[:] = means_of_parts(found, (y, x), (y_edges, x_edges))
 
     def _are_pixels(self, widths: Array) -> bool:
@@ -358,19 +392,42 @@ class FlatLayers(Chart):
         )
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
-        """Return the values at points."""
-        return self._compose(mix, lambda chart, m: chart.values(x, y, m))
+        """Return the values at points; layers are looked up within their rectangles alone."""
 
-    def _compose(self, mix: Array, look: Callable[[Chart, Array], Array]) -> Array:
+        def look(part: LayerPart, weights: Array) -> Array:
+            if part.size is None:
+                return part.chart.values(x, y, weights)
+            ends = zip((x, y), part.chart.center, (part.size.width, part.size.height), strict=True)
+            columns, rows = (np.flatnonzero(np.abs(at - c) <= size / 2) for at, c, size in ends)
+            found: Array = np.zeros((len(weights), len(y), len(x)), weights.dtype)
+            found[:, rows[:, None], columns] = part.chart.values(x[columns], y[rows], weights)
+            return found
+
+        return self._compose(mix, look)
+
+    def _compose(self, mix: Array, look: Callable[[LayerPart, Array], Array]) -> Array:
         total, clear = np.zeros(1, mix.dtype), np.ones(1, mix.dtype)
         for part in self.parts:
             own = mix[:, part.components]
             weights = np.zeros((len(mix) + 1, own.shape[1] + 1), mix.dtype)
             weights[:-1, :-1], weights[-1, -1] = own, 1
-            found = look(part.chart, weights)
+            found = look(part, weights)
             total = total + clear * found[:-1]
             clear = clear * (1 - found[-1])
         return total
+
+
+def _extreme_shares(inside: Inside, count: int, width: int) -> tuple[Array, Array]:
+    """Return where all cells of a window lie in a frame, and where one reaches into it: 0 or 1.
+
+    inside, count: the cells along an axis that reach into it, and the number of all.
+    width: cells of a window.
+    """
+    cells, cover, _ = inside
+    full, lit = np.zeros((1, count), np.float32), np.zeros((1, count), np.float32)
+    full[0, cells], lit[0, cells] = cover == 1, 1
+    size = 1, width
+    return window_extremes(np.minimum, full, size)[0], window_extremes(np.maximum, lit, size)[0]
 
 
 def _edges(edges: Array, cells: slice) -> Array:

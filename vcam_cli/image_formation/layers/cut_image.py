@@ -29,8 +29,8 @@ from vcam_cli.effects.optics.paraboloid import Paraboloid
 from vcam_cli.effects.optics.wavefront_blur import AberrationBlur
 from vcam_cli.image_formation.layers.gathering import Pixels
 from vcam_cli.image_formation.layers.layered import is_of_lens
-from vcam_cli.image_formation.layers.ray_composition import composed, ray_correction
 from vcam_cli.image_formation.layers.ray_cells import Window
+from vcam_cli.image_formation.layers.ray_composition import composed, ray_correction
 from vcam_cli.image_formation.optical_path import (
     CutReport,
     Layer,

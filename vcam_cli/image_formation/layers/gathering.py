@@ -1,8 +1,8 @@
-"""The light and the opacity of a layer at the pixels that see it: of a mosaic in their own color."""
+"""The light and opacity of a layer at the pixels that see it, of a mosaic in their own color."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 

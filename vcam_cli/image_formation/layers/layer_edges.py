@@ -21,7 +21,7 @@ from vcam_cli.effects.temporal.motion import EvenMotion
 from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.image_formation.layers.ray_cells import BORDER, Window
 from vcam_cli.image_formation.optical_path import LayerOptics
-from vcam_cli.scenes.cells import Spans, window_extremes
+from vcam_cli.scenes.cells import Spans
 from vcam_cli.scenes.layered import EVEN, LayerChart, LayerPart
 
 
@@ -99,11 +99,12 @@ def partly_hidden(
         Bound (rows, columns), 0 where all rays see the same.
     """
     low, high = _opacity_range(g, chart, optics, window)
-    spread = high - low
-    varied = spread > EVEN
-    share = np.clip((mean - low) / np.where(varied, spread, 1), 0, 1)
-    most = (share * (1 - share)).max(axis=0)
-    return np.where(varied, spread * most, 0).astype(mean.dtype)
+    out: Array = np.zeros_like(mean[0])
+    varied = high - low > EVEN
+    least, spread = low[varied], (high - low)[varied]
+    share = np.clip((mean[:, varied] - least) / spread, 0, 1)
+    out[varied] = spread * (share * (1 - share)).max(axis=0)
+    return out
 
 
 def _opacity_range(
@@ -119,9 +120,7 @@ def _opacity_range(
         first = at[0] + (cells.start - beyond - 0.5) * pitch
         edges.append(first + np.arange(cells.stop - cells.start + 2 * beyond + 1) * pitch)
         around.append(beyond)
-    low, high = chart.opacity_ends(*edges)
-    size = 2 * around[1] + 1, 2 * around[0] + 1
-    return window_extremes(np.minimum, low, size), window_extremes(np.maximum, high, size)
+    return chart.opacity_extremes(edges[0], edges[1], (2 * around[1] + 1, 2 * around[0] + 1))
 
 
 def spread_behind(

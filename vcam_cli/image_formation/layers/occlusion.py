@@ -50,8 +50,10 @@ Planes = tuple[Array, Array]
 """Light times opacity (C, h, w), and opacity (h, w) or (C, h, w)."""
 Sums = tuple[Array, Array, Array]
 """Rays (k, 5), and the sums over them of images of light (n, C, h, w) and of opacity (m, h, w)."""
-Met = Callable[[Array], tuple[slice, slice] | tuple[Array, Array]]
-"""What gives the rows and columns of cells that are met at an offset (x, y) [cells]."""
+Place = tuple[slice, slice] | tuple[Array, Array]
+"""Rows and columns of cells."""
+Met = Callable[[Array], Sequence[Place]]
+"""What gives the cells that are met at each of some offsets (n, 2), right and down [cells]."""
 Seen = Callable[[Iterable[Sums]], tuple[Array, Array]]
 """What makes of groups of rays the means over all of them in every color at the pixels:
 (n, C, rows, columns) and (m, C, rows, columns)."""
@@ -204,7 +206,7 @@ def covariance(
     inner : tuple of int
         Rows and columns of cells that have rays.
     met : callable
-        What gives, of a ray's offset (x, y) in cells, the cells at which it meets a layer.
+        What gives, of the offsets of rays, the cells at which each meets a layer.
     seen : callable
         What lens, silicon and photodetectors make of images on the inner cells.
 
@@ -219,13 +221,12 @@ def covariance(
     clears = [1 - layer.planes[-1] for layer in layers[:-1]]
 
     def summed(rays: Array) -> Sums:
-        offsets = [layer.offsets(rays) for layer in layers]
+        places = [met(layer.offsets(rays)) for layer in layers]
         # Of all that is seen behind the nearest layer, and of each that is there by itself.
         light = np.zeros((len(layers), colors, rows, columns), dtype)
         clear = np.zeros((len(layers) - 1, rows, columns), dtype)
         seen: Array = np.empty((colors, rows, columns), dtype)
-        for number in range(len(rays)):
-            at = [met(own[number]) for own in offsets]
+        for at in zip(*places, strict=True):
             behind = lights[-1][:, *at[-1]]
             light[-1] += behind
             for k in range(len(layers) - 2, -1, -1):

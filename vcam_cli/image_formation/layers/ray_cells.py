@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.fft
@@ -20,7 +21,7 @@ from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.blurs import Blur, SeparableTransfer
 from vcam_cli.effects.optics.diffraction import Diffraction
-from vcam_cli.image_formation.layers.occlusion import Sums
+from vcam_cli.image_formation.layers.occlusion import Place, Sums
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.physics.cache import ByteCache
@@ -103,13 +104,13 @@ class Cells:
     divided: tuple[float, float] = (1.0, 1.0)
     """Part of a pixel along x and y that rays come from; the rest has cells of its own."""
 
-    @property
+    @cached_property
     def sides(self) -> tuple[float, float]:
         """Of a cell along x and y [m]."""
         g, (x, y) = self.geometry, self.divided
         return g.pitch_x * x / self.per_pixel, g.pitch_y * y / self.per_pixel
 
-    @property
+    @cached_property
     def inner(self) -> tuple[int, int]:
         """Rows and columns of cells of the window and its border."""
         rows, columns = (n * self.per_pixel + 2 * self.border for n in self.window.pixels)
@@ -153,25 +154,30 @@ class Cells:
             found.append(np.append(edges, pixels[-1] + pitch))
         return found[0], found[1]
 
-    def met(self, offset: Array) -> tuple[slice, slice] | tuple[Array, Array]:
-        """Return the rows and columns of all cells at which a ray meets a layer.
+    def met(self, offsets: Array) -> list[Place]:
+        """Return the rows and columns of all cells at which each of some rays meets a layer.
 
         Parameters
         ----------
-        offset : Array
-            Offset (x, y) of where it meets the layer from the beginning of the ray's own cell
-            [cells].
+        offsets : Array
+            Offsets (n, 2), right and down, of where they meet the layer from the beginning of the
+            ray's own cell [cells].
 
         Returns
         -------
-        rows, columns
-            Of the inner cells, in their order: slices, or indices (rows, 1) and (columns,).
+        list of Place
+            Rows and columns of the inner cells, in their order: slices, or indices (rows, 1) and
+            (columns,).
         """
-        if self.divided == (1.0, 1.0):
-            (down, right), (rows, columns) = self.reach, self.inner
-            top = self.per_pixel * down + math.floor(offset[1])
-            left = self.per_pixel * right + math.floor(offset[0])
-            return slice(top, top + rows), slice(left, left + columns)
+        if self.divided != (1.0, 1.0):
+            return [self._met_divided(offset) for offset in offsets]
+        (down, right), (rows, columns) = self.reach, self.inner
+        whole = np.floor(offsets).astype(int) + self.per_pixel * np.array([right, down])
+        return [
+            (slice(top, top + rows), slice(left, left + columns)) for left, top in whole.tolist()
+        ]
+
+    def _met_divided(self, offset: Array) -> Place:
         found = []
         for axis in (1, 0):
             count, gaps = self.per_pixel, self._in_gap(axis)
@@ -382,6 +388,10 @@ class SharpImage:
 
     def _shares(self, cells: Cells, axis: int) -> Array:
         """Return what part of a pixel's light each of its cells (n,) collects along an axis."""
+        key = "collected", cells.per_pixel, axis
+        return self._known.get(key, lambda: self._made_shares(cells, axis))
+
+    def _made_shares(self, cells: Cells, axis: int) -> Array:
         n = cells.per_pixel
         half = sum(box[-1 - axis] for box in self._apertures) / cells.sides[-1 - axis] / 2
         low, high = (min(max(n / 2 + end, 0.0), n) for end in (-half, half))

@@ -196,7 +196,7 @@ class RaySum:
         np.maximum(light, 0, out=light)
         most = max((one.memory for one in sums), default=0)
         memory = self.sharp.nbytes + sum(one.light.nbytes for one in sums)
-        memory += min(self.path.workers, len(sums)) * most
+        memory += min(self.path.workers, len(sums)) * (most + self._painting_bytes(sums))
         used = [one for one in sums if one.light.any()]
         if not used:
             return Hidden(memory=memory)
@@ -205,6 +205,12 @@ class RaySum:
         error = stated * math.sqrt(squares / (g.rows * g.columns))
         values = sum(one.values for one in sums)
         return Hidden(finest.cells, finest.rays, error, 0.0, values, memory)
+
+    def _painting_bytes(self, sums: Sequence[_Sum]) -> int:
+        """Return the memory of painting the most cells of a sum [bytes]."""
+        every = (self._cells(one.window, one.level) for one in sums)
+        most = max(every, key=lambda cells: math.prod(cells.inner), default=None)
+        return 0 if most is None else self.painting_bytes(most)
 
     def _first_sum(self, window: Window) -> _Sum:
         """Return the sum of the second level, whose cells are halves of the first one's."""
@@ -249,7 +255,7 @@ class RaySum:
     def _summed(self, level: int, cells: Cells, layers: Sequence[RayLayer]) -> _Sum:
         """Return the sum of a level."""
         of, dtype = self.levels[level], self.path.settings.dtype
-        memory = covariance_bytes(layers, cells.inner) + self.painting_bytes(cells)
+        memory = covariance_bytes(layers, cells.inner)
         if all(layer.planes[-1].min() == layer.planes[-1].max() for layer in layers[:-1]):
             colors = len(self.path.mosaic.colors)
             none: Array = np.zeros((colors, *cells.window.pixels), dtype)
