@@ -133,6 +133,8 @@ def product(left: Array, right: Array, dtype: type | None = None) -> Array:
     It is computed in their float type, and rounded to `dtype` where that is another.
     """
     out = np.empty((len(left), right.shape[1]), dtype or right.dtype)
+    if left.size * right.shape[1] <= PRODUCT:
+        return np.matmul(left, right, out=out)
     if left.size > PRODUCT >= right.size:
         for rows in pieces(len(out), max(1, PRODUCT // max(1, right.size))):
             np.matmul(left[rows], right, out=out[rows])

@@ -341,6 +341,10 @@ class ProductSpectrum:
 
 def _sums_of_products(values: Array, edges: Array) -> Array:
     """Return the sums of products of all rows (n, terms) over blocks: (len(edges) - 1, n, n)."""
+    if values.size * len(values) <= PRODUCT:
+        own = np.ascontiguousarray(values[:, edges[0] : edges[-1]], np.float64)
+        sums = np.add.reduceat(own[:, None] * own, edges[:-1] - edges[0], axis=2)
+        return np.ascontiguousarray(np.moveaxis(sums, 2, 0))
     longest = max(16, PRODUCT // len(values) ** 2)  # of long rows a BLAS takes 20 times as long
     out = np.zeros((len(edges) - 1, len(values), len(values)))
     for total, block in zip(out, pairwise(edges), strict=True):
