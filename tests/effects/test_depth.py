@@ -235,3 +235,35 @@ def test_the_focus_is_at_the_scene_unless_it_is_given(tmp_path):
     assert near.scene_scale == -near.magnification
     assert far.scene_scale == pytest.approx(far.image_distance / 0.5)
     assert far.focus_shift == pytest.approx(far.image_distance**2 * (1 / 0.5 - 1 / 2))
+
+
+@pytest.mark.parametrize(
+    "pattern", ["bayer-grbg", {"block": [["B", "R", "G"], ["R", "G", "G"], ["G", "B", "R"]]}]
+)
+def test_a_mosaic_has_what_pixels_of_all_colors_have_of_its_own(pattern, tmp_path):
+    """Layers are composed in each pixel's own color, wherever their windows begin."""
+    places = ("0.3 m", 0.009, (1, -2)), ("0.4 m", 0.012, (4, 1)), ("1 m", None, None)
+    layers: list[dict] = []
+    for distance, width, place in places:
+        layers.append({"source": {"kind": "chart", "chart": "colorchecker"}, "distance": distance})
+        if width is not None:
+            position = [f"{n / 5} mm" for n in place]
+            layers[-1] |= {"width": f"{width} m", "position": position}
+    made = {
+        "scene.source": {"kind": "layers", "layers": layers},
+        "scene.illuminant": "equal-energy",
+        "optics": LENS | {"focus_distance": "0.5 m"},
+        "array.rows": 71,
+        "array.columns": 96,
+        "array.filters": "generic-rgb",
+    }
+    every, alike = seen(tmp_path, RAYS, made, {"array.pattern": "stacked"})
+    found, frame = seen(tmp_path, RAYS, made, {"array.pattern": pattern})
+    colors = frame.mosaic.color_at(np.arange(71), np.arange(96))
+    own = np.take_along_axis(every, colors[None], 0)[0] * (
+        alike.white_rate[0] / frame.white_rate[0]
+    )
+    assert error(found, own) <= frame.spectrum.depth.error + alike.spectrum.depth.error
+    for color in range(3):
+        other = np.where(colors == color, every[(color + 1) % 3], own)
+        assert error(other, own) > 5 * CLOSE  # colors differ

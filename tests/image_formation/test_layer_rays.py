@@ -11,9 +11,11 @@ from optical_paths import PITCH as PIXEL_PITCH
 from optical_paths import aperture, path, sensor
 
 from vcam_cli import simulate
+from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.image_formation.estimates import chart_cells, scene_sampling
 from vcam_cli.image_formation.layers import layered, ray_windows
+from vcam_cli.image_formation.layers.gathering import Pixels
 from vcam_cli.image_formation.layers.occlusion import RayLayer, covariance, rays
 from vcam_cli.image_formation.layers.ray_cells import Cells, SharpImage, Window
 from vcam_cli.image_formation.layers.ray_windows import LEVELS, _Sum, _too_coarse, windows_with
@@ -194,6 +196,15 @@ def test_extremes_are_those_of_every_window(size):
     windows = np.lib.stride_tricks.sliding_window_view(plane, size)
     for larger, expected in ((np.maximum, windows.max((2, 3))), (np.minimum, windows.min((2, 3)))):
         np.testing.assert_array_equal(window_extremes(larger, plane, size), expected)
+
+
+def test_pixels_of_a_window_take_their_own_color():
+    mosaic = Mosaic((("B", "R", "G"), ("R", "G", "G")))
+    whole = replace(path(sensor(16, 16), colors=mosaic), is_mosaic=True)
+    image = np.random.default_rng(3).random((3, 5, 6))
+    found = Pixels(whole, Window(slice(3, 8), slice(5, 11))).own(image)
+    colors = mosaic.color_at(np.arange(3, 8), np.arange(5, 11))
+    np.testing.assert_array_equal(found, np.take_along_axis(image, colors[None], 0))
 
 
 @pytest.mark.parametrize("divided", [(1.0, 1.0), (0.6, 1.0), (0.3, 0.85)])
