@@ -94,7 +94,7 @@ def _coarse(lattice: Geometry, block_rows: int, block_columns: int) -> Geometry:
 
 
 def estimated_light(
-    seen: SceneLight, coarse: Solved, picture: ScenePicture, run: Run
+    seen: SceneLight, coarse: Solved, picture: ScenePicture, run: Run, is_planned: bool = True
 ) -> tuple[photon_rate.Rate, ExposedLight]:
     """Return a scene's light on a coarse lattice, and its exposure.
 
@@ -108,6 +108,8 @@ def estimated_light(
         What the scene's files hold.
     run : Run
         How it is computed.
+    is_planned : bool, optional
+        Whether a plan needs what effects change, and the levels of the scene.
 
     Returns
     -------
@@ -132,4 +134,4 @@ def estimated_light(
     path = replace(plan.reduced(few.path), optional=())
     light = photon_rate.photo_rate(path, few.scene, coarse.layout.planes)
     light = replace(light, plan=plan, spectrum=expected)
-    return light, expose(few, light)
+    return light, expose(few, light, is_planned)

@@ -35,7 +35,7 @@ from vcam_cli.simulation import autofocus, cost_model
 from vcam_cli.simulation.coarse_light import coarse_camera, estimated_light
 from vcam_cli.simulation.exposed_light import expose
 from vcam_cli.simulation.frame import Frame, take_frame
-from vcam_cli.simulation.preparation import Prepared, plan_frame
+from vcam_cli.simulation.preparation import Prepared, plan_frame, whole_frame
 from vcam_cli.simulation.reading import read_camera
 from vcam_cli.simulation.run import Run
 from vcam_cli.simulation.scene_files import ScenePicture, flattened
@@ -82,7 +82,7 @@ def prepare(
         camera = bracket_cameras(camera)[longest_of(camera)]
     solved, picture, notes = read_camera(camera, run.stages, shared)
     solved, picture, flat = flattened(solved, picture)
-    trial = partial(_prepare, picture=picture, run=run.unseen())
+    trial = partial(_prepare, picture=picture, run=run.unseen(), is_planned=False)
     solved, focused, seconds = autofocus.focused(solved, trial, run.workers, run.stages)
     ready = prepare_light(solved, picture, run.after(seconds), is_estimated)
     return ready, of_bracket + notes + flat + focused
@@ -115,7 +115,7 @@ def prepare_light(
     if not (solved.scene.moves and solved.exposure.is_timed_by_scene):
         return form(solved, picture, run)
     with run.stages("metering"):
-        metered = form(solved.standing_still(), picture, run.unseen(run.rate_cache))
+        metered = form(solved.standing_still(), picture, run.unseen(run.rate_cache), False)
     once = cost_model.light_seconds(metered.layout, metered.spectrum, run.workers)
     timed = solved.timed(metered.exposure_time, metered.solved.gain, metered.times)
     ready = form(timed, picture, run.after(once, lights=1))
@@ -123,23 +123,30 @@ def prepare_light(
     return replace(ready, solved=written, exposure_limit=metered.exposure_limit)
 
 
-def _prepare(solved: Solved, picture: ScenePicture, run: Run) -> Prepared:
-    """Return the same where times are given, or nothing moves."""
+def _prepare(solved: Solved, picture: ScenePicture, run: Run, is_planned: bool = True) -> Prepared:
+    """Return the same where times are given, or nothing moves.
+
+    Its light and its time are known before it is planned: metering and focus need no more.
+    """
     seen = scene_light(solved, picture, run)
     seen, light = formed_light(seen, picture, run)
     with run.stages("exposure"):
-        exposed = expose(seen, light)
+        exposed = expose(seen, light, is_planned)
+        if not is_planned:
+            return whole_frame(seen, light, exposed)
         return plan_frame(seen, light, exposed, run)
 
 
-def _estimate(solved: Solved, picture: ScenePicture, run: Run) -> Prepared:
+def _estimate(solved: Solved, picture: ScenePicture, run: Run, is_planned: bool = True) -> Prepared:
     """Return a plan's camera: its light is that of few places where the array is large."""
     coarse = coarse_camera(solved)
     if coarse is None:
-        return _prepare(solved, picture, run)
+        return _prepare(solved, picture, run, is_planned)
     seen = scene_light(solved, picture, run)
     with run.stages("exposure"):
-        light, exposed = estimated_light(seen, coarse, picture, run)
+        light, exposed = estimated_light(seen, coarse, picture, run, is_planned)
+        if not is_planned:
+            return whole_frame(seen, light, exposed)
         ready = plan_frame(seen, light, exposed, run)
     g = coarse.layout.lattice
     return replace(ready, estimated_places=g.rows * g.columns)
