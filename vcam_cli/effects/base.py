@@ -35,7 +35,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from typing import ClassVar, Literal, TypeVar, cast
 
@@ -89,6 +89,10 @@ class SignalLevels:
     extreme: float = math.inf
     """Largest signal that noise makes of the brightest pixel, in front of all clamps
     [electrons]."""
+    variances: dict[Effect, Array] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
+    """Those of noise sources at the levels, of those requested before: see `total_variance`."""
 
     @property
     def weighed(self) -> tuple[float, ...]:

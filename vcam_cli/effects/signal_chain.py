@@ -441,14 +441,13 @@ def total_variance(sources: Iterable[NoiseSource], signal: SignalLevels) -> Arra
     Array
         Variance (n,) [electrons squared]; of the mean of pixels that are read as one.
     """
-    listed = tuple(sources)
-    return np.array(
-        [
-            sum(source.binned_variance(level, signal.dark, signal.binning) for source in listed)
-            for level in signal.weighed
-        ],
-        dtype=float,
-    )
+    known, total = signal.variances, np.zeros(len(signal.weighed))
+    for source in sources:
+        if source not in known:
+            each = (source.binned_variance(v, signal.dark, signal.binning) for v in signal.weighed)
+            known[source] = np.fromiter(each, float, len(total))
+        total += known[source]
+    return total
 
 
 def extreme_signal(sources: Sequence[NoiseSource], brightest: float, dark: float) -> float:

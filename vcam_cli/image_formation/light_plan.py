@@ -31,6 +31,7 @@ from vcam_cli.effects.warps import StillWarp, Warp
 from vcam_cli.image_formation.estimates.edge_changes import exact_changes, has_straight_edges
 from vcam_cli.image_formation.estimates.light_cost import LightCost
 from vcam_cli.image_formation.optical_path import OpticalPath
+from vcam_cli.physics.cache import remembered
 from vcam_cli.scenes.base import ChartScene
 from vcam_cli.scenes.blur_change import BlurLoss
 from vcam_cli.scenes.depth_scene import DepthScene
@@ -224,9 +225,7 @@ def _spread_light(weights: Array, spread: Array) -> tuple[Array, Array]:
 
 def _share(path: OpticalPath, scene: AnyScene, effect: Effect) -> float:
     """Return a bound on what a gain, glare, sharing or transport changes; inf for none."""
-    share = effect.mean_error(SignalLevels(full_signal=1.0, time=1.0))
-    share = math.inf if share is None else share
-    allowed = LEVEL_SHARE * path.settings.tolerance
+    share, allowed = _mean_error(effect), LEVEL_SHARE * path.settings.tolerance
     for gain in of_kind([effect], Gain):
         low, high = _range_of_gains(path, (gain,))
         if max(abs(1 - low), abs(1 - high)) > allowed:  # of some pixel's light
@@ -253,11 +252,28 @@ def _share(path: OpticalPath, scene: AnyScene, effect: Effect) -> float:
     return share
 
 
+@remembered(64)
+def _mean_error(effect: Effect) -> float:
+    """Return a bound on what an effect changes of the mean signal, over it; inf for none.
+
+    A camera that meters a scene at rest asks twice.
+    """
+    share = effect.mean_error(SignalLevels(full_signal=1.0, time=1.0))
+    return math.inf if share is None else share
+
+
 def _range_of_gains(path: OpticalPath, gains: Collection[Gain]) -> tuple[float, float]:
     """Return the least and the largest product of gains over the array, 1 on the axis."""
     g = path.geometry
-    x, y = (np.linspace(-size / 2, size / 2, PLACES) for size in (g.sensor_width, g.sensor_height))
-    colors = path.mosaic.colors
+    return _range_over_array(tuple(gains), g.sensor_width, g.sensor_height, path.mosaic.colors)
+
+
+@remembered(16)
+def _range_over_array(
+    gains: tuple[Gain, ...], width: float, height: float, colors: tuple[str, ...]
+) -> tuple[float, float]:
+    """Return the same for an array of a size [m]."""
+    x, y = (np.linspace(-size / 2, size / 2, PLACES) for size in (width, height))
     products = [np.ones((1, 1))] * (1 if all(gain.is_neutral for gain in gains) else len(colors))
     for gain in gains:
         axis = gain.on_axis or 1.0

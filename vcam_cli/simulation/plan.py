@@ -137,7 +137,7 @@ def make(
     variances = _SceneVariances(present, with_lower_levels(signal, tolerance), tolerance)
     omitted = {*light.omitted, *_negligible(effects, variances, light, shares)}
     on = tuple(effect for effect in present if effect not in omitted)
-    active, idle = _without_idle_draws(effects, on, variances)
+    active, idle = _without_idle_draws(effects, on, tuple(omitted), variances)
     running = {effect.name: effect for effect in active}
     weigh = _Weighing(present, signal, shares, pixels, running, idle, tolerance)
     decisions = [_decide(kind, effects, light, omitted, weigh) for kind in ORDER]
@@ -176,12 +176,9 @@ def _negligible(
         error = effect.mean_error(signal)
         return math.inf if error is None else error / signal.full_signal
 
-    def variance_share(effects: Sequence[Effect]) -> float:
-        return variances.share_lost([effect for effect in present if effect not in effects])
-
     def use(effect: Effect) -> float:
         of_mean = mean_share(effect) / (OMITTED_SHARE * variances.tolerance)
-        return max(of_mean, variance_share([effect]))
+        return max(of_mean, variances.share_lost([effect]))
 
     def worth(effects: tuple[Effect, ...]) -> tuple[float, int, float]:
         return (
@@ -196,7 +193,7 @@ def _negligible(
     return next(
         together
         for together in sorted(sets, key=worth, reverse=True)
-        if sum(map(mean_share, together)) <= budget and variance_share(together) <= 1
+        if sum(map(mean_share, together)) <= budget and variances.share_lost(together) <= 1
     )
 
 
@@ -208,46 +205,52 @@ class _SceneVariances:
     """All effects that are wanted."""
     signal: SignalLevels
     tolerance: float
-    _known: dict[tuple[Effect, float], Array] = field(default_factory=dict)
-    """Variances of one source at the levels, without so much dark signal."""
+    _signals: dict[float, SignalLevels] = field(default_factory=dict)
+    """The signal without so much of the dark, of those requested before."""
 
     @cached_property
     def whole(self) -> Array:
         """With all effects: (2, levels) [electrons squared]."""
-        return self.of_effects(self.present)
+        return _of_scopes(self.present, self.signal)
 
-    def of_effects(self, kept: Sequence[Effect]) -> Array:
-        """Return them with some effects alone: (2, levels) [electrons squared].
+    def share_lost(self, gone: Sequence[Effect], instead: Sequence[Effect] = ()) -> float:
+        """Return the largest relative change without some effects, over what is allowed.
 
-        Without a charge, both the dark signal and the level are lower.
+        Parameters
+        ----------
+        gone : sequence of Effect
+            Effects that are left out of all.
+        instead : sequence of Effect, optional
+            What remains of them.
         """
-        gone = [charge for charge in self._charges if charge not in kept]
-        missing = sum(charge.rate() for charge in gone) * self.signal.time
-        total = np.zeros((2, len(self.signal.weighed)))
-        for scope, sums in zip(("frame", "sensor"), total, strict=True):
-            for source in noise_sources(kept, scope):
-                if (source, missing) not in self._known:
-                    found = total_variance([source], self._signal_without(missing))
-                    self._known[source, missing] = found
-                sums += self._known[source, missing]
-        return total
-
-    @cached_property
-    def _charges(self) -> tuple[Charge, ...]:
-        return of_kind(self.present, Charge)
+        if missing := sum(charge.rate() for charge in of_kind(gone, Charge)) * self.signal.time:
+            # Without a charge the dark signal and every level are lower, for all that is kept.
+            kept = [effect for effect in self.present if effect not in gone]
+            lost = self.whole - _of_scopes([*kept, *instead], self._signal_without(missing))
+        else:
+            lost = _of_scopes(gone, self.signal) - _of_scopes(instead, self.signal)
+        share = np.abs(lost) / np.maximum(self.whole, 1e-300)
+        return float(share.max()) / (2 * VARIANCE_SHARE * self.tolerance)
 
     def _signal_without(self, missing: float) -> SignalLevels:
-        levels = tuple(max(level - missing, 0.0) for level in self.signal.weighed)
-        return replace(self.signal, dark=max(self.signal.dark - missing, 0.0), levels=levels)
+        if missing not in self._signals:
+            dark = max(self.signal.dark - missing, 0.0)
+            levels = tuple(max(level - missing, 0.0) for level in self.signal.weighed)
+            self._signals[missing] = replace(self.signal, dark=dark, levels=levels)
+        return self._signals[missing]
 
-    def share_lost(self, kept: Sequence[Effect]) -> float:
-        """Return the largest relative change with some effects alone, over what is allowed."""
-        lost = np.abs(self.of_effects(kept) - self.whole) / np.maximum(self.whole, 1e-300)
-        return float(lost.max()) / (2 * VARIANCE_SHARE * self.tolerance)
+
+def _of_scopes(effects: Sequence[Effect], signal: SignalLevels) -> Array:
+    """Return the temporal and the fixed-pattern variance of effects (2, levels) [e squared]."""
+    scopes = (noise_sources(effects, scope) for scope in ("frame", "sensor"))
+    return np.array([total_variance(sources, signal) for sources in scopes])
 
 
 def _without_idle_draws(
-    effects: CameraEffects, on: Sequence[Effect], variances: _SceneVariances
+    effects: CameraEffects,
+    on: Sequence[Effect],
+    omitted: Sequence[Effect],
+    variances: _SceneVariances,
 ) -> tuple[tuple[Effect, ...], dict[str, tuple[str, ...]]]:
     """Return the effects that run less draws that hardly add to a variance, and those, by effect.
 
@@ -256,19 +259,22 @@ def _without_idle_draws(
     lean, idle = dict[Effect, Effect](), dict[str, tuple[str, ...]]()
     for source in of_kind(on, NoiseSource):
         if source.parts and effects.wish(source) == "auto":
-            others = [lean.get(effect, effect) for effect in on if effect is not source]
-            if names := _idle_parts(source, others, variances):
+            gone, instead = (*omitted, *lean, source), tuple(lean.values())
+            if names := _idle_parts(source, gone, instead, variances):
                 lean[source], idle[source.name] = source.without_parts(names), names
     return tuple(lean.get(effect, effect) for effect in on), idle
 
 
 def _idle_parts(
-    source: NoiseSource, others: Sequence[Effect], variances: _SceneVariances
+    source: NoiseSource,
+    gone: Sequence[Effect],
+    instead: Sequence[Effect],
+    variances: _SceneVariances,
 ) -> tuple[str, ...]:
     """Return the parts of a source that may go together, those that add least first."""
 
     def share_lost(names: Sequence[str]) -> float:
-        return variances.share_lost((*others, source.without_parts(names)))
+        return variances.share_lost(gone, (*instead, source.without_parts(names)))
 
     out: tuple[str, ...] = ()
     lost = {name: share_lost([name]) for name in source.parts if getattr(source, name)}

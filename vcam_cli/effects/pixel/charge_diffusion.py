@@ -57,8 +57,8 @@ class ChargeDiffusion(RadialTransfer):
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
-        at = np.array([100e3])
-        green, red = (100 * float(self.otf(at, w)[0]) for w in (550e-9, 650e-9))
+        at = self.spectral_otf(np.array([100e3]), np.array([550e-9, 650e-9]))
+        green, red = 100 * at[:, 0]
         return f"MTF at 100 lp/mm: {green:.3g} % at 550 nm, {red:.3g} % at 650 nm"
 
     def otf(self, frequency: Array, wavelength: float) -> Array:

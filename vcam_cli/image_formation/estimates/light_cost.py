@@ -297,9 +297,9 @@ def expected_report(
         As those of `LightCost`.
     """
     scene = scene.flat if isinstance(scene, LayeredScene | DepthScene) else scene
-    path = path.with_effects(effects)
     if isinstance(scene, WAVES) or path.transfer.is_dark:
         return SpectrumReport()
+    path = path.with_effects(effects)
     if not path.transfer.effects and not path.field and path.averages_over_box:
         return _averaged(path, scene)
     edges = isinstance(scene, ChartScene) and scene.chart.profile() is not None
