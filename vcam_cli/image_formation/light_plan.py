@@ -176,12 +176,17 @@ def _blur_shares(cost: LightCost, budget: float) -> dict[Effect, float]:
     if not losses or path.layers:  # what layers hide of each other has no bound
         return dict.fromkeys(losses, math.inf)
     flat = scene.flat if isinstance(scene, LayeredScene | DepthScene) else scene
-    bounds = flat.change_bounds(list(losses.values()), path.geometry, path.ceiling, budget)
+    given, has_edges = list(losses.values()), has_straight_edges(flat)
+    if has_edges:  # a blur over the field as if it were everywhere as where it is most: see below
+        given = [replace(loss, is_uniform=True) for loss in given]
+    bounds = flat.change_bounds(given, path.geometry, path.ceiling, budget)
     # Pixels that are read as one have less than the brightest of them.
     bounds = replace(bounds, full=min(bounds.full, path.full))
     shares: dict[Effect, float] = dict(zip(losses, bounds.shares(), strict=True))
-    if has_straight_edges(flat):
-        shares |= _edge_shares(cost, flat, losses, shares, bounds.full, budget)
+    if has_edges:  # such a bound says whether exact sums pay, no more
+        exact = _edge_shares(cost, flat, shares, bounds.full, budget)
+        varied = [e for e, loss in losses.items() if shares[e] > 0 and not loss.is_uniform]
+        shares |= dict.fromkeys(varied, math.inf) | exact
     # Points in place of averages alias what detail there is: only of even light is that nothing.
     detailed = [e for e in of_kind(shares, PixelAperture) if shares[e] > 0]
     return shares | dict.fromkeys(detailed, math.inf)
@@ -190,7 +195,6 @@ def _blur_shares(cost: LightCost, budget: float) -> dict[Effect, float]:
 def _edge_shares(
     cost: LightCost,
     scene: ChartScene,
-    losses: Mapping[Effect, BlurLoss],
     shares: Mapping[Effect, float],
     full: float,
     budget: float,
@@ -200,10 +204,8 @@ def _edge_shares(
     Beside a blur over the field that stays, no other one saves as much as its sum takes.
     """
     path, exact = cost.path, dict[Effect, float]()
-    for over_field in of_kind(losses, FieldTransfer):
-        even = replace(losses[over_field], is_uniform=True)
-        guess = scene.change_bounds([even], path.geometry, path.ceiling, budget).changes[0]
-        worth_it = guess <= LOOSEST_OVER_FIELD * budget * full
+    for over_field in of_kind(shares, FieldTransfer):
+        worth_it = shares[over_field] <= LOOSEST_OVER_FIELD * budget
         if not (worth_it and cost.saved((over_field,)) > EXACT_OVER_FIELD):
             return {}
         exact |= exact_changes(path, scene, [over_field])

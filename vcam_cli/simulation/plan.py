@@ -223,7 +223,8 @@ class _SceneVariances:
         instead : sequence of Effect, optional
             What remains of them.
         """
-        if missing := sum(charge.rate() for charge in of_kind(gone, Charge)) * self.signal.time:
+        rates = [charge.rate() for charge in of_kind(gone, Charge)]
+        if missing := math.fsum(rates) * self.signal.time:
             # Without a charge the dark signal and every level are lower, for all that is kept.
             kept = [effect for effect in self.present if effect not in gone]
             lost = self.whole - _of_scopes([*kept, *instead], self._signal_without(missing))

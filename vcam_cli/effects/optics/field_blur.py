@@ -30,6 +30,7 @@ from vcam_cli.effects.optics.wavefront_blur import (
     wavefronts,
 )
 from vcam_cli.physics import zernike
+from vcam_cli.physics.cache import remembered
 from vcam_cli.physics.zernike import Terms
 
 TYPICAL_CHANGE = 0.1
@@ -91,6 +92,7 @@ class FieldBlur(AberrationBlur, FieldTransfer):
         """Return the blur on the half-axis to the right, at a place from 0 to 1."""
         return DirectedBlur(self.lens, self.wavefront(place), self.focus)
 
+    @remembered(64)
     def wavefront(self, place: float) -> Terms:
         """Return the wavefront at a place on the half-axis to the right.
 
@@ -113,6 +115,7 @@ class FieldBlur(AberrationBlur, FieldTransfer):
             )
         )
 
+    @remembered(8)
     def rings(self, count: int) -> tuple[Zone, ...]:
         """Return `count` places from center to corner, or more, whose weights sum to 1.
 

@@ -245,10 +245,11 @@ class CellError:
     def _of_aligned(self, side: float) -> float:
         """Return the mean square for edges along rows and columns of energy 1 [m]."""
         f, _ = self._table
-        turns = f * side
-        parts = (np.square(_folded(turns, k) * side / (2 * np.pi * (turns + k))) for k in FOLDS)
-        folded = np.where(turns < 0.5, sum(parts, np.zeros_like(f)), np.square(self._unit_edge))
-        return max(2 * float(np.trapezoid(passed * folded, f)) for passed in self._passed_across)
+        turns = np.minimum(f * side, 0.5)
+        # of k: the contrast turns / (turns + k), squared, times the energy (d / 2 pi (turns + k))^2
+        parts = (1 / np.square(np.square(turns + np.array(FOLDS)[:, None]))).sum(axis=0)
+        folded = np.where(turns < 0.5, np.square(turns * side / (2 * np.pi)) * parts, self._beyond)
+        return float((self._weights_across @ folded).max())
 
     def _of_alike(self, side: float) -> float:
         """Return a bound on the mean square for a line along rows or columns of energy 1 [m].
@@ -276,6 +277,19 @@ class CellError:
         f, _ = self._table
         still = np.zeros_like(f)
         return self._squared_transfer(f, still), self._squared_transfer(still, f)
+
+    @cached_property
+    def _weights_across(self) -> Array:
+        """Weights (2, n) of an integral over the frequencies, both signs: along x, and along y."""
+        f, _ = self._table
+        weights = np.full(len(f), 2 * f[1])
+        weights[[0, -1]] /= 2
+        return weights * self._passed_across
+
+    @cached_property
+    def _beyond(self) -> Array:
+        """What edges of energy 1 have at the frequencies (n,) [m^2]."""
+        return np.asarray(np.square(self._unit_edge))
 
     @cached_property
     def _unit_edge(self) -> Array:
