@@ -350,12 +350,13 @@ def _sampled(path: OpticalPath, scene: SampledScene, planes: int) -> SpectrumRep
     rings = far_parts(path, near, scene, widest)
     highest, cells = highest_passed(path, near), 0
     error = FREQUENCY_SHARE * path.settings.tolerance * path.full
-    # Where a blur over the field is least the image ends next to where it would without it.
+    # Where a blur over the field is least, the image ends next to where it would without it, and
+    # its cells are 2 % coarser; tables of its contrast would take longer than all of the plan.
     sharp = path.with_effects([e for e in path.effects if e is not path.field])
     edges = CellError.of_chart(sharp, near, highest).end(error / SURE)
     end = BEYOND * 2 * max(g.pitch_x, g.pitch_y) * edges
     if scene.is_painted:
-        highest = cells_per_pixel(path, near, highest).per_pixel
+        highest = cells_per_pixel(sharp, near, highest).per_pixel
         near = near.with_cells(cell_grid(near, g, highest))
         cells = math.prod(near.shape)
     highest = min(end, highest)
