@@ -89,7 +89,8 @@ def wave_layers(path: OpticalPath, scene: WaveScene) -> tuple[Layers, SpectrumRe
 
     whole = layers(path.effects)
     changes = _changes(path, whole, layers, layer)
-    return (layer(*parts) for parts in whole), SpectrumReport(changes=changes)
+    report = SpectrumReport(changes=changes, waves=scene.waves_that_vary)
+    return (layer(*parts) for parts in whole), report
 
 
 def _zone_otfs(path: OpticalPath, wave: Wave) -> Array:

@@ -58,6 +58,9 @@ EXACT, EXACT_OVER_FIELD = 10e-3, 20e-3
 LOOSEST, LOOSEST_OVER_FIELD = 8.0, 24.0
 """Bounds over exact sums, at most, of edges that lie anywhere to the pixels: larger ones stay. Of
 blurs over the field the bounds are those of the steepest wavefront everywhere."""
+DARKER = 0.67
+"""Full signal over what is assumed of it below which a sampled image is formed again: it errs by
+0.62 to 0.74 of the tolerance, and may by `USED_SHARE`."""
 MOST_TRIED = 10
 """Number of effects up to which all subsets are tried; beyond it, those that change least."""
 
@@ -78,6 +81,9 @@ class LightPlan:
     [s]."""
     saved_together: float = 0.0
     """Core seconds that all of them would take [s]."""
+    of_all: float = 0.0
+    """Core seconds of a sampled image with all effects [s]; 0 where nothing is left out, and of
+    light in closed form."""
 
     @property
     def share(self) -> float:
@@ -88,6 +94,25 @@ class LightPlan:
     def on_axis(self) -> float:
         """Factor on the signal on the axis of the gains that are left out."""
         return math.prod((gain.on_axis for gain in of_kind(self.omitted, Gain)), start=1.0)
+
+    def formed(self, times: int, darkness: float) -> LightPlan:
+        """Return the plan with what is saved of light that was formed.
+
+        Parameters
+        ----------
+        times : int
+            How often it was formed.
+        darkness : float
+            Full signal over what was assumed of it.
+
+        Returns
+        -------
+        LightPlan
+            The plan.
+        """
+        more = max((2 if darkness < DARKER else 1) - times, 0)
+        saved = times * self.saved_together + more * self.of_all
+        return replace(self, saved_together=saved)
 
     def reduced(self, path: OpticalPath) -> OpticalPath:
         """Return the path without the omitted effects.
@@ -140,7 +165,8 @@ def light_plan(path: OpticalPath, scene: AnyScene) -> LightPlan:
     omitted = _best_set(cost, small[:MOST_TRIED], shares, budget)
     known = {e.name: share for e, share in shares.items() if math.isfinite(share)}
     idle = tuple(e for e in small if e not in omitted)
-    return LightPlan(omitted, idle, known, *_saved(cost, omitted))
+    of_all = cost.of_all if omitted else 0.0
+    return LightPlan(omitted, idle, known, *_saved(cost, omitted), of_all)
 
 
 def _saved(cost: LightCost, omitted: Collection[Effect]) -> tuple[dict[str, float], float]:

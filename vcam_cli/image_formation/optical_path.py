@@ -364,6 +364,12 @@ class SpectrumReport:
     """Samples of one plane of the scene that were transformed; 0 where its spectrum is known."""
     cells_per_pixel: float = 0.0
     """Cells of a painted chart per pixel pitch; 0 where there are none."""
+    waves: int = 0
+    """Waves that it is the sum of, beside even light, each evaluated at all pixels."""
+    has_edges: bool = False
+    """Whether it is light between parallel edges, evaluated by distance."""
+    times: int = 1
+    """How often it was formed: again where it is much darker than assumed."""
     is_averaged: bool = False
     """Whether it was averaged over the photodetectors, as no blur needs its spectrum."""
     is_painted: bool = False

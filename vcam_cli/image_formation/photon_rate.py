@@ -122,13 +122,17 @@ def photo_rate(path: OpticalPath, scene: AnyScene, planes: bool = False) -> Rate
     """
     plan = light_plan(path, scene)
     path = replace(plan.reduced(path), is_mosaic=not planes)
+    assumed, times = path.full, 0
     while True:
+        times += 1
         with path.device.errors():
             found = _gathered(path, scene, planes)
         full = min(float(found.values.max(initial=0.0)), path.ceiling)
         # Where the light is so much darker than assumed that it errs by more, it is computed again.
         if full >= path.full or found.spectrum.lost_rms <= path.usable_error * full:
-            return replace(found, plan=plan, spectrum=_with_place_error(path, found.spectrum))
+            plan = plan.formed(times, full / assumed if assumed else 1.0)
+            report = replace(_with_place_error(path, found.spectrum), times=times)
+            return replace(found, plan=plan, spectrum=report)
         path = replace(path, full=full)
 
 

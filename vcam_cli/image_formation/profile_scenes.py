@@ -96,7 +96,8 @@ def profile_layers(path: OpticalPath, profile: Profile) -> tuple[Layers, Spectru
             signal = all_edges(color, x + y[:1, None])
         return np.broadcast_to(signal, (len(y[rows]), len(x))).astype(path.settings.dtype)
 
-    report = SpectrumReport(changes=edge.changes(), peak=float(edge.level.max() * edge.brightest))
+    peak = float(edge.level.max() * edge.brightest)
+    report = SpectrumReport(changes=edge.changes(), peak=peak, has_edges=True)
     return iter([Layer(values)]), report
 
 

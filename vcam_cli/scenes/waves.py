@@ -54,6 +54,11 @@ class WaveScene:
         level = sum(wave.weights[0] * math.cos(wave.phase) for wave in steady)
         return level, sum(abs(wave.weights[0]) for wave in self.waves if wave not in steady)
 
+    @property
+    def waves_that_vary(self) -> int:
+        """Number of its waves, even light aside."""
+        return sum(1 for wave in self.waves if wave.frequency)
+
     def values_at(self, x: Array, y: Array, mix: Array) -> Array:
         """Return sum_k mix[r, k] B_k at points.
 

@@ -25,7 +25,7 @@ from vcam_cli.errors import bad
 
 OVERFULL = 100
 """Full wells of charge in a hot pixel: more than the noise of any readout brings below one."""
-DRAW, DEFECTS = 8e-9, 7e-9
+DRAW, DEFECTS = 7.5e-9, 4.2e-9
 """Time of one pixel for each part that is drawn, and for defects [core seconds]."""
 
 

@@ -40,7 +40,7 @@ class PatternShading(NoiseSource):
     reference = "EMVA 1288 release 4.0, section 8 (low frequencies of the spectrogram); own model"
     keys_behind_light = ("pixel.fpn.shading",)
     absent = "pixel.fpn.shading has the value none or 0"
-    seconds_per_pixel = 7e-9
+    seconds_per_pixel = 5.6e-9
     scope = "sensor"
     sample_draws = "common"
 

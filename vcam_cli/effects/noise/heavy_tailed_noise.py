@@ -104,7 +104,7 @@ class HeavyTailedNoise(NoiseSource):
     )
     keys_behind_light = ("pixel.readout.heavy_tailed_noise",)
     absent = "pixel.readout.heavy_tailed_noise has the value none or 0"
-    seconds_per_pixel = 23e-9
+    seconds_per_pixel = 9e-9
     origin = "readout"
 
     @classmethod

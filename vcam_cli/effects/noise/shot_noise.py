@@ -30,7 +30,7 @@ class ShotNoise(NoiseSource):
     reference = "Chen 2003, eq 2.26: variance = number of electrons collected"
     keys_behind_light = ("accuracy.shot_noise",)
     absent = "every pixel has it"
-    seconds_per_pixel = 20e-9
+    seconds_per_pixel = 10e-9
     sample_draws = "cumulative"
     in_charge = True
 

@@ -46,7 +46,7 @@ class TelegraphNoise(NoiseSource):
     )
     keys_behind_light = ("pixel.readout.telegraph_noise",)
     absent = "pixel.readout.telegraph_noise has the value none or 0"
-    seconds_per_pixel = 19e-9
+    seconds_per_pixel = 14e-9
 
     @classmethod
     def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:

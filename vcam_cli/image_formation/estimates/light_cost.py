@@ -35,21 +35,21 @@ from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.layered import AnyScene, LayeredScene
 from vcam_cli.scenes.waves import WaveScene
 
-FIXED = 1.5e-3
+FIXED = 0.6e-3
 """What does not depend on the size of a frame's light [s]."""
-SPECTRUM = 10e-3
+SPECTRUM = 12e-3
 """The same where it has a spectrum: tables of the transfer function, edges of a chart [s]."""
-FAR_PART = 4e-3
+FAR_PART = 1.7e-3
 """The same of each ring of a far field [s]."""
-SAMPLE = 6e-9
+SAMPLE = 4.3e-9
 """Transforming one sample of one plane of the scene [s]."""
-PAINT = 2.5e-9
+PAINT = 1.8e-9
 """Painting one sample of one plane of a chart, its edges aside [s]."""
-TERM = 0.7e-9
+TERM = 1.15e-9
 """Filtering one term of the spectrum for one plane and color [s]."""
-EVALUATE = 4e-9
+EVALUATE = 7.5e-9
 """One pixel of one color from its spectrum [s]."""
-FAR = 20e-9
+FAR = 41e-9
 """The same from the spectrum of a part of the far field, whose cells and pixels have no common grid
 [s]."""
 OTF = 25e-9
@@ -64,8 +64,14 @@ AVERAGE_SAMPLED = 25e-9
 """More for one of a picture, and one sample of it [s]."""
 PAINT_PIXEL = 13e-9
 """One pixel painted as the exact mean of a chart [s]."""
+LEVEL = 0.5e-9
+"""One pixel of one color of even light [s]."""
 WAVE = 5e-9
-"""One pixel of one wave, or behind one edge, in one color [s]."""
+"""More for each wave [s]."""
+EDGES = 4.5e-3
+"""What does not depend on the number of pixels of light between parallel edges [s]."""
+EDGE = 7.5e-9
+"""One pixel of one color beside parallel edges, however many [s]."""
 SPLINE = 40e-9
 """One value of the still image behind sub-exposures into coefficients of splines [s]."""
 LOOK = 110e-9
@@ -92,12 +98,10 @@ PLANES = 4
 PARITIES, MODES, MODES_OF_EDGES = 4, 4, 2
 """Filters of a blur with a direction, and of one that changes over the field, about: few parallel
 edges need fewer modes."""
-FIELD = 0.045
+FIELD = 0.035
 """Finding the modes of a blur over the field up to the Nyquist frequency of the pixels, and by its
 square up to another [s]."""
-MODE = 35e-9
-"""One pixel of one further mode of the field: its map, and what its direction costs [s]."""
-SHEARED = 3
+SHEARED = 1.6
 """Cost of pixels whose rows see the scene at other places over that of others."""
 ENTRIES_OF_PLANE = 150
 """Entries along an axis of a table over fx and fy, about."""
@@ -188,7 +192,7 @@ def image_seconds(geometry: Geometry, colors: int, report: SpectrumReport) -> fl
     """
     rays = RAY * report.cut.ray_values if report.cut else 0.0
     rays += LOOK_UP * report.depth.ray_values if report.depth else 0.0
-    return (
+    once = (
         rays
         + _flat_seconds(geometry, colors, report)
         + sum(
@@ -196,6 +200,7 @@ def image_seconds(geometry: Geometry, colors: int, report: SpectrumReport) -> fl
             for cells, planes, own in report.parts
         )
     )
+    return report.times * once
 
 
 def _flat_seconds(geometry: Geometry, colors: int, report: SpectrumReport) -> float:
@@ -207,7 +212,8 @@ def _flat_seconds(geometry: Geometry, colors: int, report: SpectrumReport) -> fl
         sampled = AVERAGE_SAMPLED * (values + report.cells) if report.cells else 0.0
         return always + AVERAGE * values + painted + sampled
     if not report.terms:
-        return always + WAVE * values
+        edges = EDGES + EDGE * values if report.has_edges else 0.0
+        return always + (LEVEL + WAVE * report.waves) * values + edges
     cells_of_part = report.far_cells / max(1, report.far_parts)
     return (
         always
@@ -217,7 +223,6 @@ def _flat_seconds(geometry: Geometry, colors: int, report: SpectrumReport) -> fl
         + FAR * report.far_filters * values
         + FIELD * report.oversampling**2 * report.has_field
         + report.field_seconds
-        + MODE * (report.filters - 1) * geometry.rows * geometry.columns * report.has_field
         + (SAMPLE + PAINT) * report.far_cells * report.planes
         + TERM * colors * report.far_filters * report.planes * cells_of_part
         + TABLE * report.table_values
@@ -231,6 +236,10 @@ def _spline_seconds(colors: int, report: SpectrumReport) -> float:
     return (EVALUATE + SPLINE) * report.fine_pixels * colors if report.sub_exposures else 0.0
 
 
+MAKE_IMAGES = Blur, SeparableTransfer, FieldTransfer, Warp
+"""Kinds of effects on which the time of an image depends."""
+
+
 @dataclass(frozen=True)
 class LightCost:
     """What light through some of a path's effects costs, before it is computed."""
@@ -239,8 +248,9 @@ class LightCost:
     """Lens, pixels and settings."""
     scene: AnyScene
     """The scene, flat."""
-    _images: dict[tuple[Effect, ...], float] = field(default_factory=dict)
-    """Effects that blur -> seconds of the image that they make, of those requested before."""
+    _images: dict[tuple[Effect, ...], tuple[float, bool]] = field(default_factory=dict)
+    """Effects that blur -> seconds of the image that they make, and whether it has a spectrum, of
+    those requested before."""
 
     def saved(self, omitted: Collection[Effect]) -> float:
         """Return the time that leaving out some effects saves.
@@ -257,19 +267,24 @@ class LightCost:
         """
         pixels = self.path.geometry.rows * self.path.geometry.columns
         gains = sum(effect.pixel_seconds for effect in omitted) * pixels
-        kinds = Blur, SeparableTransfer, FieldTransfer, Warp
-        if not of_kind(omitted, *kinds):  # the image is the same, whatever it takes
+        if not of_kind(omitted, *MAKE_IMAGES):  # the image is the same, whatever it takes
             return gains
-        blurs = of_kind(self.path.effects, *kinds)
+        blurs = of_kind(self.path.effects, *MAKE_IMAGES)
         kept = tuple(blur for blur in blurs if blur not in omitted)
-        return gains + self._image(blurs) - self._image(kept)
+        return gains + self._image(blurs)[0] - self._image(kept)[0]
 
-    def _image(self, blurs: tuple[Effect, ...]) -> float:
+    @property
+    def of_all(self) -> float:
+        """Time of the image with every effect, if it has a spectrum; else 0 [core seconds]."""
+        seconds, has_spectrum = self._image(of_kind(self.path.effects, *MAKE_IMAGES))
+        return seconds if has_spectrum else 0.0
+
+    def _image(self, blurs: tuple[Effect, ...]) -> tuple[float, bool]:
         if blurs not in self._images:
             self._images[blurs] = self._image_seconds(blurs)
         return self._images[blurs]
 
-    def _image_seconds(self, blurs: Sequence[Effect]) -> float:
+    def _image_seconds(self, blurs: Sequence[Effect]) -> tuple[float, bool]:
         # Waves need their transfer at their own frequencies alone, no table of it.
         every = () if isinstance(self.scene, WAVES) else of_kind(blurs, Blur, FieldTransfer)
         computed = of_kind(every, GeometricTransfer)
@@ -281,7 +296,8 @@ class LightCost:
         seconds = otfs + image_seconds(g, len(self.path.mosaic.colors), report)
         if len(still) > len(of_kind(still, Magnification)):
             seconds += WARPED * WARPED_CELLS * g.rows * g.columns
-        return seconds * (COLOR_GROUPS if any(warp.knots for warp in still) else 1)
+        seconds *= COLOR_GROUPS if any(warp.knots for warp in still) else 1
+        return seconds, report.terms > 0
 
 
 def expected_report(
@@ -297,14 +313,16 @@ def expected_report(
         As those of `LightCost`.
     """
     scene = scene.flat if isinstance(scene, LayeredScene | DepthScene) else scene
-    if isinstance(scene, WAVES) or path.transfer.is_dark:
+    if path.transfer.is_dark:
         return SpectrumReport()
+    if isinstance(scene, WAVES):
+        return SpectrumReport(waves=scene.waves_that_vary if isinstance(scene, WaveScene) else 1)
     path = path.with_effects(effects)
     if not path.transfer.effects and not path.field and path.averages_over_box:
         return _averaged(path, scene)
     edges = isinstance(scene, ChartScene) and scene.chart.profile() is not None
     if edges and not path.field:
-        return SpectrumReport()
+        return SpectrumReport(has_edges=True)
     planes = min(PLANES, len(path.transfer.weights))
     found = _sampled(path, scene, planes)
     directed = bool(path.transfer.plane_blurs)
