@@ -366,8 +366,8 @@ class SpectrumReport:
     """Cells of a painted chart per pixel pitch; 0 where there are none."""
     waves: int = 0
     """Waves that it is the sum of, beside even light, each evaluated at all pixels."""
-    has_edges: bool = False
-    """Whether it is light between parallel edges, evaluated by distance."""
+    edges: int = 0
+    """Parallel edges that it lies between, evaluated by distance."""
     times: int = 1
     """How often it was formed: again where it is much darker than assumed."""
     is_averaged: bool = False

@@ -97,7 +97,7 @@ def profile_layers(path: OpticalPath, profile: Profile) -> tuple[Layers, Spectru
         return np.broadcast_to(signal, (len(y[rows]), len(x))).astype(path.settings.dtype)
 
     peak = float(edge.level.max() * edge.brightest)
-    report = SpectrumReport(changes=edge.changes(), peak=peak, has_edges=True)
+    report = SpectrumReport(changes=edge.changes(), peak=peak, edges=len(profile.places))
     return iter([Layer(values)]), report
 
 

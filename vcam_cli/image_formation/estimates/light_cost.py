@@ -58,19 +58,20 @@ PUPIL = 0.05
 """Transforms of the pupil of one wavefront at all wavelengths [s]."""
 TABLE = 1e-6
 """One value of a transfer function of fx and fy, its part of the pupil's transforms too [s]."""
-AVERAGE = 1.2e-9
+AVERAGE = 3.5e-9
 """One pixel of one color as the mean of a chart over its photodetector [s]."""
 AVERAGE_SAMPLED = 25e-9
 """More for one of a picture, and one sample of it [s]."""
-PAINT_PIXEL = 13e-9
+PAINT_PIXEL = 12e-9
 """One pixel painted as the exact mean of a chart [s]."""
 LEVEL = 0.5e-9
 """One pixel of one color of even light [s]."""
 WAVE = 5e-9
 """More for each wave [s]."""
-EDGES = 4.5e-3
-"""What does not depend on the number of pixels of light between parallel edges [s]."""
-EDGE = 7.5e-9
+EDGES, EDGE = 3.5e-3, 0.2e-3
+"""What does not depend on the number of pixels of light between parallel edges, and more for each
+edge [s]."""
+BESIDE = 5e-9
 """One pixel of one color beside parallel edges, however many [s]."""
 SPLINE = 40e-9
 """One value of the still image behind sub-exposures into coefficients of splines [s]."""
@@ -212,7 +213,7 @@ def _flat_seconds(geometry: Geometry, colors: int, report: SpectrumReport) -> fl
         sampled = AVERAGE_SAMPLED * (values + report.cells) if report.cells else 0.0
         return always + AVERAGE * values + painted + sampled
     if not report.terms:
-        edges = EDGES + EDGE * values if report.has_edges else 0.0
+        edges = EDGES + EDGE * report.edges + BESIDE * values if report.edges else 0.0
         return always + (LEVEL + WAVE * report.waves) * values + edges
     cells_of_part = report.far_cells / max(1, report.far_parts)
     return (
@@ -320,13 +321,13 @@ def expected_report(
     path = path.with_effects(effects)
     if not path.transfer.effects and not path.field and path.averages_over_box:
         return _averaged(path, scene)
-    edges = isinstance(scene, ChartScene) and scene.chart.profile() is not None
-    if edges and not path.field:
-        return SpectrumReport(has_edges=True)
+    profile = scene.chart.profile() if isinstance(scene, ChartScene) else None
+    if profile and not path.field:
+        return SpectrumReport(edges=len(profile.places))
     planes = min(PLANES, len(path.transfer.weights))
     found = _sampled(path, scene, planes)
     directed = bool(path.transfer.plane_blurs)
-    modes = MODES_OF_EDGES if edges else MODES
+    modes = MODES_OF_EDGES if profile else MODES
     filters = modes if path.field else PARITIES if directed else 1
     return replace(
         found,
