@@ -253,8 +253,10 @@ def _spread_light(weights: Array, spread: Array) -> tuple[Array, Array]:
 
 def _share(path: OpticalPath, scene: AnyScene, effect: Effect) -> float:
     """Return a bound on what a gain, glare, sharing or transport changes; inf for none."""
-    share, allowed = _mean_error(effect), LEVEL_SHARE * path.settings.tolerance
-    for gain in of_kind([effect], Gain):
+    gains = of_kind([effect], Gain)
+    share = _mean_error_of_gain(gains[0]) if gains else _mean_error(effect)
+    allowed = LEVEL_SHARE * path.settings.tolerance
+    for gain in gains:
         low, high = _range_of_gains(path, (gain,))
         if max(abs(1 - low), abs(1 - high)) > allowed:  # of some pixel's light
             return math.inf
@@ -280,14 +282,14 @@ def _share(path: OpticalPath, scene: AnyScene, effect: Effect) -> float:
     return share
 
 
-@remembered(64)
 def _mean_error(effect: Effect) -> float:
-    """Return a bound on what an effect changes of the mean signal, over it; inf for none.
-
-    A camera that meters a scene at rest asks twice.
-    """
+    """Return a bound on what an effect changes of the mean signal, over it; inf for none."""
     share = effect.mean_error(SignalLevels(full_signal=1.0, time=1.0))
     return math.inf if share is None else share
+
+
+_mean_error_of_gain = remembered(16)(_mean_error)
+"""Gains do not depend on the scene: a camera that meters it at rest asks twice."""
 
 
 def _range_of_gains(path: OpticalPath, gains: Collection[Gain]) -> tuple[float, float]:

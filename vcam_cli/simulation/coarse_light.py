@@ -126,7 +126,7 @@ def estimated_light(
     """
     plan = light_plan(seen.path, seen.scene)
     whole = plan.reduced(seen.path)
-    expected = expected_report(whole, seen.scene, whole.effects)
+    expected = expected_report(whole, seen.scene, whole.effects, with_memory=True)
     geometry = seen.solved.geometry
     memory_model.require(expected.memory, geometry)
     few = scene_light(coarse, picture, run.unseen())

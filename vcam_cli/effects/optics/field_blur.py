@@ -64,6 +64,7 @@ class FieldBlur(AberrationBlur, FieldTransfer):
         lens = Lens.from_camera(camera, geometry)
         return cls(lens, listed, half_diagonal, focus_table(camera))
 
+    @remembered(4)
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
         center, corner = (self.lens.describe(self.wavefront(place)) for place in (0.0, 1.0))

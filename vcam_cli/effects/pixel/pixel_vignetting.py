@@ -31,6 +31,7 @@ from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.pixel_signal import NeutralGain
 from vcam_cli.floats import rms
 from vcam_cli.physics import vignetting
+from vcam_cli.physics.cache import remembered
 
 POINTS = (17, 33, 65)
 """Along each axis of the quadrant, as many as are needed."""
@@ -93,6 +94,7 @@ class PixelVignetting(NeutralGain):
             camera.accuracy.vignetting_points,
         )
 
+    @remembered(4)
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
         ends = np.array([0, self.half_width]), np.array([0, self.half_height])

@@ -101,7 +101,9 @@ def cell_grid(scene: ChartScene, geometry: Geometry, per_pixel: float) -> tuple[
     return fast[0], fast[1]
 
 
-def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> ChosenCells:
+def cells_per_pixel(
+    path: OpticalPath, scene: ChartScene, highest: float, error: CellError | None = None
+) -> ChosenCells:
     """Return the fewest cells whose error keeps its share of the tolerance.
 
     Parameters
@@ -112,6 +114,8 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> Cho
         The chart.
     highest : float
         Frequency beyond which lens and pixels pass nothing [pixel Nyquist].
+    error : CellError, optional
+        That of the chart, where it is known already.
 
     Returns
     -------
@@ -121,7 +125,7 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> Cho
     asked = path.settings.oversampling
     if asked is not None:
         return ChosenCells(asked)
-    error = CellError.of_chart(path, scene, highest)
+    error = error or CellError.of_chart(path, scene, highest)
     budget = CELLS_SHARE * path.settings.tolerance * path.full
     low, high = 0, math.ceil(math.log(MOST / LEAST) / math.log(FINER))
     while low < high:

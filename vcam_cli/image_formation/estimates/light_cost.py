@@ -109,7 +109,7 @@ ENTRIES_OF_PLANE = 150
 WARPED_CELLS, COLOR_GROUPS = 6, 4
 """Cells of a warped chart per pixel, and wavelengths at which a warp by color is followed, as often
 as not."""
-BEYOND = 1.25
+BEYOND = 1.15
 """Where the spectrum of a chart ends over where that of edges anywhere would, as often as not."""
 HIGHEST = 2.0
 """Highest frequency of a picture that is filtered, as often as not [pixel Nyquist]."""
@@ -286,8 +286,9 @@ class LightCost:
         return self._images[blurs]
 
     def _image_seconds(self, blurs: Sequence[Effect]) -> tuple[float, bool]:
-        # Waves need their transfer at their own frequencies alone, no table of it.
-        every = () if isinstance(self.scene, WAVES) else of_kind(blurs, Blur, FieldTransfer)
+        # Waves need their transfer at their own frequencies alone, no table of it; those of a blur
+        # over the field are in `FIELD`.
+        every = () if isinstance(self.scene, WAVES) else of_kind(blurs, Blur)
         computed = of_kind(every, GeometricTransfer)
         tabulated = [blur for blur in every if blur not in computed]
         lines = len(tabulated) + (DIRECTED - 1) * len(of_kind(tabulated, PlaneTransfer))
@@ -302,7 +303,7 @@ class LightCost:
 
 
 def expected_report(
-    path: OpticalPath, scene: AnyScene, effects: Sequence[Effect]
+    path: OpticalPath, scene: AnyScene, effects: Sequence[Effect], with_memory: bool = False
 ) -> SpectrumReport:
     """Return how a scene would be sampled and filtered.
 
@@ -312,6 +313,8 @@ def expected_report(
     ----------
     path, scene, effects
         As those of `LightCost`.
+    with_memory : bool, optional
+        Whether the memory of a sampled scene is estimated, too: a tenth of the time of a plan.
     """
     scene = scene.flat if isinstance(scene, LayeredScene | DepthScene) else scene
     if path.transfer.is_dark:
@@ -325,7 +328,7 @@ def expected_report(
     if profile and not path.field:
         return SpectrumReport(edges=len(profile.places))
     planes = min(PLANES, len(path.transfer.weights))
-    found = _sampled(path, scene, planes)
+    found = _sampled(path, scene, planes, with_memory)
     directed = bool(path.transfer.plane_blurs)
     modes = MODES_OF_EDGES if profile else MODES
     filters = modes if path.field else PARITIES if directed else 1
@@ -355,14 +358,16 @@ def _averaged(path: OpticalPath, scene: SampledScene) -> SpectrumReport:
     return replace(found, is_painted=True, edge_seconds=scene.chart.edge_seconds)
 
 
-def _sampled(path: OpticalPath, scene: SampledScene, planes: int) -> SpectrumReport:
+def _sampled(
+    path: OpticalPath, scene: SampledScene, planes: int, with_memory: bool
+) -> SpectrumReport:
     """Return the cells of a scene, the predicted terms of its spectrum and their memory."""
     g = path.geometry
     pixels = g.rows * g.columns
     if not isinstance(scene, ChartScene):
         end = min(highest_passed(path, scene), HIGHEST)
         cells, terms = math.prod(scene.shape), round(pixels * end**2)
-        needed = memory_model.image_bytes(path, scene, end, planes, ())
+        needed = memory_model.image_bytes(path, scene, end, planes, ()) if with_memory else 0
         return SpectrumReport(oversampling=end, cells=cells, terms=terms, memory=needed)
     widest = reach(path) + path.travel
     near = near_field(path, scene, widest)
@@ -372,18 +377,19 @@ def _sampled(path: OpticalPath, scene: SampledScene, planes: int) -> SpectrumRep
     # Where a blur over the field is least, the image ends next to where it would without it, and
     # its cells are 2 % coarser; tables of its contrast would take longer than all of the plan.
     sharp = path.with_effects([e for e in path.effects if e is not path.field])
-    edges = CellError.of_chart(sharp, near, highest).end(error / SURE)
-    end = BEYOND * 2 * max(g.pitch_x, g.pitch_y) * edges
+    of_cells = CellError.of_chart(sharp, near, highest)
+    end = BEYOND * 2 * max(g.pitch_x, g.pitch_y) * of_cells.end(error / SURE)
     if scene.is_painted:
-        highest = cells_per_pixel(sharp, near, highest).per_pixel
+        highest = cells_per_pixel(sharp, near, highest, of_cells).per_pixel
         near = near.with_cells(cell_grid(near, g, highest))
         cells = math.prod(near.shape)
     highest = min(end, highest)
+    needed = memory_model.image_bytes(path, near, highest, planes, rings) if with_memory else 0
     return SpectrumReport(
         oversampling=highest,
         cells=cells,
         terms=round(pixels * highest**2),
-        memory=memory_model.image_bytes(path, near, highest, planes, rings),
+        memory=needed,
         is_painted=scene.is_painted,
         edge_seconds=scene.chart.edge_seconds if scene.is_painted else 0.0,
         far_parts=len(rings),
