@@ -116,7 +116,6 @@ class FieldBlur(AberrationBlur, FieldTransfer):
             )
         )
 
-    @remembered(8)
     def rings(self, count: int) -> tuple[Zone, ...]:
         """Return `count` places from center to corner, or more, whose weights sum to 1.
 
