@@ -288,7 +288,8 @@ def times(name: str, scene: str, folder: Path) -> Times:
         found = Times(name, scene, *best, *least, planned * slowness, scatter, omitted)
         holds = found.is_foretold and not found.is_slower
         spent = time.process_time() - start
-        if turn >= (TURNS if holds else MOST_TURNS) or spent > ENOUGH * (1 if holds else 3):
+        enough = spent > ENOUGH * (1 if holds else 3) and turn >= PARTS  # else nothing scatters
+        if turn >= (TURNS if holds else MOST_TURNS) or enough:
             return found
 
 
