@@ -89,7 +89,8 @@ def wave_layers(path: OpticalPath, scene: WaveScene) -> tuple[Layers, SpectrumRe
 
     whole = layers(path.effects)
     changes = _changes(path, whole, layers, layer)
-    report = SpectrumReport(changes=changes, waves=scene.waves_that_vary)
+    has_field = path.field is not None
+    report = SpectrumReport(changes=changes, waves=scene.waves_that_vary, has_field=has_field)
     return (layer(*parts) for parts in whole), report
 
 
@@ -241,7 +242,8 @@ def harmonic_layers(
 
     whole = layers(path.effects)
     changes = _changes(path, whole, layers, layer)
-    return (layer(*parts) for parts in whole), SpectrumReport(changes=changes)
+    report = SpectrumReport(changes=changes, waves=1, has_field=path.field is not None)
+    return (layer(*parts) for parts in whole), report
 
 
 def _harmonic_levels(transfer: Transfer, fx: Array, fy: Array) -> Array:

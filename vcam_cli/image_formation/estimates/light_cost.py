@@ -68,6 +68,8 @@ LEVEL = 0.5e-9
 """One pixel of one color of even light [s]."""
 WAVE = 5e-9
 """More for each wave [s]."""
+FIELD_OF_LEVEL = 1.6e-3
+"""What a blur over the field makes of even light: next to nothing, found at every place of it [s]."""
 EDGES, EDGE = 3.5e-3, 0.2e-3
 """What does not depend on the number of pixels of light between parallel edges, and more for each
 edge [s]."""
@@ -214,7 +216,8 @@ def _flat_seconds(geometry: Geometry, colors: int, report: SpectrumReport) -> fl
         return always + AVERAGE * values + painted + sampled
     if not report.terms:
         edges = EDGES + EDGE * report.edges + BESIDE * values if report.edges else 0.0
-        return always + (LEVEL + WAVE * report.waves) * values + edges
+        level = LEVEL * values + FIELD_OF_LEVEL * report.has_field
+        return always + level + WAVE * report.waves * values + edges
     cells_of_part = report.far_cells / max(1, report.far_parts)
     return (
         always
@@ -320,7 +323,9 @@ def expected_report(
     if path.transfer.is_dark:
         return SpectrumReport()
     if isinstance(scene, WAVES):
-        return SpectrumReport(waves=scene.waves_that_vary if isinstance(scene, WaveScene) else 1)
+        waves = scene.waves_that_vary if isinstance(scene, WaveScene) else 1
+        has_field = bool(of_kind(effects, FieldTransfer))
+        return SpectrumReport(waves=waves, has_field=has_field)
     path = path.with_effects(effects)
     if not path.transfer.effects and not path.field and path.averages_over_box:
         return _averaged(path, scene)
