@@ -69,7 +69,7 @@ LEVEL = 0.5e-9
 WAVE = 5e-9
 """More for each wave [s]."""
 FIELD_OF_LEVEL = 1.6e-3
-"""What a blur over the field makes of even light: next to nothing, found at every place of it [s]."""
+"""What a blur over the field takes of even light, which it does not change: its places [s]."""
 EDGES, EDGE = 3.5e-3, 0.2e-3
 """What does not depend on the number of pixels of light between parallel edges, and more for each
 edge [s]."""
