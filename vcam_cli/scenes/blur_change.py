@@ -165,7 +165,7 @@ def _integrals(places: Array, heights: Array, lengths: Array, loss: BlurLoss) ->
 
 
 _pairs = remembered(8)(np.triu_indices)
-"""Indices of pairs of so many edges: they take a third of the time of few."""
+"""Indices of the pairs of a number of edges: of few edges they take a third of the time."""
 
 
 def squares_factor(pitch: float, loss: BlurLoss) -> Array:
