@@ -206,7 +206,7 @@ class _SceneVariances:
     signal: SignalLevels
     tolerance: float
     _signals: dict[float, SignalLevels] = field(default_factory=dict)
-    """Dark signal that is missing [electrons] -> the signal without it, of those requested before."""
+    """Missing dark signal [electrons] -> the signal without it, of those requested before."""
 
     @cached_property
     def whole(self) -> Array:
