@@ -202,14 +202,16 @@ def _blur_shares(cost: LightCost, budget: float) -> dict[Effect, float]:
     if not losses or path.layers:  # what layers hide of each other has no bound
         return dict.fromkeys(losses, math.inf)
     flat = scene.flat if isinstance(scene, LayeredScene | DepthScene) else scene
-    given, has_edges = list(losses.values()), has_straight_edges(flat)
-    if has_edges:  # a blur over the field as if it were everywhere as where it is most: see below
+    given = list(losses.values())
+    if has_straight_edges(
+        flat
+    ):  # a blur over the field as if it were everywhere as where it is most: see below
         given = [replace(loss, is_uniform=True) for loss in given]
     bounds = flat.change_bounds(given, path.geometry, path.ceiling, budget)
     # Pixels that are read as one have less than the brightest of them.
     bounds = replace(bounds, full=min(bounds.full, path.full))
     shares: dict[Effect, float] = dict(zip(losses, bounds.shares(), strict=True))
-    if has_edges:  # such a bound says whether exact sums pay, no more
+    if has_straight_edges(flat):  # such a bound says whether exact sums pay, no more
         exact = _edge_shares(cost, flat, shares, bounds.full, budget)
         varied = [e for e, loss in losses.items() if shares[e] > 0 and not loss.is_uniform]
         shares |= dict.fromkeys(varied, math.inf) | exact
