@@ -21,7 +21,7 @@ import numpy as np
 from numpy.random.bit_generator import ISeedSequence
 
 from vcam_cli.arrays import Array
-from vcam_cli.physics.cache import ByteCache
+from vcam_cli.cache import ByteCache
 
 BLOCK_ROWS = 64
 """Rows of the array that share one stream, and that flow together through the engine."""

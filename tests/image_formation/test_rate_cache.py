@@ -5,12 +5,12 @@ import pytest
 from making import camera
 
 from vcam_cli import plan, simulate
+from vcam_cli.cache import ByteCache
 from vcam_cli.files.images.png import write_png
 from vcam_cli.image_formation.light_plan import LightPlan
 from vcam_cli.image_formation.optical_path import SpectrumReport
 from vcam_cli.image_formation.photon_rate import Rate
 from vcam_cli.image_formation.rate_cache import RateCache
-from vcam_cli.physics.cache import ByteCache
 from vcam_cli.simulation import scene_light
 from vcam_cli.simulation.shared import KEPT, RECENT, Shared
 from vcam_cli.solve.light_key import INDEPENDENT_KEYS, light_key

@@ -9,7 +9,7 @@ from every import every
 from making import long_except
 from support import scene, view
 
-from vcam_cli.physics.cache import ByteCache
+from vcam_cli.cache import ByteCache
 from vcam_cli.scenes import disc_edges, discs
 from vcam_cli.scenes.base import Frame, PaintedCells
 from vcam_cli.scenes.build import build

@@ -11,6 +11,7 @@ from itertools import chain
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.cache import ByteCache
 from vcam_cli.camera.camera import Camera
 from vcam_cli.config.document import Document
 from vcam_cli.datasets.device_frames import batch_key, device_frames
@@ -22,7 +23,6 @@ from vcam_cli.errors import BadInput
 from vcam_cli.files.frame_archive import archive_bytes, array_hash
 from vcam_cli.image_formation.rate_cache import RateCache
 from vcam_cli.parallel import ThreadPool, suitable_workers
-from vcam_cli.physics.cache import ByteCache
 from vcam_cli.quality.photon_transfer import ROUNDING
 from vcam_cli.readout.chain import ReadoutChain
 from vcam_cli.readout.exposure import mean_dark

@@ -17,6 +17,7 @@ from itertools import combinations
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.cache import remembered
 from vcam_cli.effects.base import Effect, SignalLevels, of_kind
 from vcam_cli.effects.blurs import Blur, FieldTransfer, SeparableTransfer
 from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
@@ -31,7 +32,6 @@ from vcam_cli.effects.warps import StillWarp, Warp
 from vcam_cli.image_formation.estimates.edge_changes import exact_changes, has_straight_edges
 from vcam_cli.image_formation.estimates.light_cost import LightCost
 from vcam_cli.image_formation.optical_path import OpticalPath
-from vcam_cli.physics.cache import remembered
 from vcam_cli.scenes.base import ChartScene
 from vcam_cli.scenes.blur_change import BlurLoss
 from vcam_cli.scenes.depth_scene import DepthScene

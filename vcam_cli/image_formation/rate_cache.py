@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from vcam_cli.cache import ByteCache
 from vcam_cli.image_formation.photon_rate import Rate
 from vcam_cli.image_formation.transfer_functions import Transfer
-from vcam_cli.physics.cache import ByteCache
 
 _LIMIT = 1 << 28
 """Bytes of light that are kept."""

@@ -23,6 +23,7 @@ from itertools import chain
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.cache import remembered
 from vcam_cli.devices.processor import require
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.blurs import Blur, FieldTransfer, RadialTransfer, SeparableTransfer
@@ -65,7 +66,6 @@ from vcam_cli.image_formation.optical_path import Layer, Layers, OpticalPath, Sp
 from vcam_cli.image_formation.profile_scenes import profile_layers
 from vcam_cli.image_formation.sub_exposures import sub_exposed_layers, sub_exposed_motion
 from vcam_cli.image_formation.transfer_tables import Tables, mixtures, tabulate
-from vcam_cli.physics.cache import remembered
 from vcam_cli.physics.ray_spot import RaySpot
 from vcam_cli.scenes.base import ChartScene, HarmonicScene, SampledScene
 from vcam_cli.scenes.depth_scene import DepthScene

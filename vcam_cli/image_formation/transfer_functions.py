@@ -21,10 +21,10 @@ from functools import cached_property
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.cache import ByteCache, remembered
 from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.blurs import Blur, GeometricTransfer, PlaneTransfer, RadialTransfer
 from vcam_cli.parallel import pieces, product
-from vcam_cli.physics.cache import ByteCache, remembered
 from vcam_cli.spectra import Spectrum, pair_weights, photons
 
 VALUES = 1 << 17

@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.cache import ByteCache
 from vcam_cli.effects.blurs import Blur, GeometricTransfer, PlaneTransfer
 from vcam_cli.image_formation.scene_spectrum import Pair, pairs
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.parallel import product, slices_within
-from vcam_cli.physics.cache import ByteCache
 
 PARITIES = ((False, False), (True, True), (True, False), (False, True))
 """Whether a transfer function turns the cosines along x, and along y, into sines."""

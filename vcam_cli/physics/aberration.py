@@ -27,8 +27,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vcam_cli.arrays import Array
+from vcam_cli.cache import ByteCache
 from vcam_cli.physics import pupil_grid, pupil_harmonics, zernike
-from vcam_cli.physics.cache import ByteCache
 from vcam_cli.physics.zernike import Floats, Terms
 
 MAX_SLOPE = 200.0

@@ -25,8 +25,8 @@ from functools import partial
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.cache import ByteCache, remembered
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.physics.cache import ByteCache, remembered
 from vcam_cli.scenes.closed_form import Profile
 
 

@@ -16,7 +16,7 @@ from typing import Protocol, TypeVar, cast
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.physics.cache import ByteCache
+from vcam_cli.cache import ByteCache
 from vcam_cli.scenes import disc_edges
 from vcam_cli.scenes.disc_edges import CrossedCells, Discs
 from vcam_cli.scenes.runs import concatenate_ranges, expand_ranges, topmost_numbers

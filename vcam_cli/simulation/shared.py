@@ -9,9 +9,9 @@ from pathlib import Path
 from threading import Lock
 from typing import Any
 
+from vcam_cli.cache import ByteCache
 from vcam_cli.camera.camera import Camera
 from vcam_cli.image_formation.rate_cache import RateCache
-from vcam_cli.physics.cache import ByteCache
 from vcam_cli.simulation.output.provenance import data_files
 from vcam_cli.simulation.scene_files import scene_bytes
 

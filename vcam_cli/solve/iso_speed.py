@@ -13,12 +13,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.cache import remembered
 from vcam_cli.camera.exposure import Exposure
 from vcam_cli.effects.pixel_signal import Gain
 from vcam_cli.errors import Path, bad
 from vcam_cli.image_formation.pixel_response import PixelResponse, axis_levels
 from vcam_cli.physics import readout
-from vcam_cli.physics.cache import remembered
 from vcam_cli.spectra import VISIBLE, Spectrum, illuminant, luminance
 
 DAYLIGHT = "D55"

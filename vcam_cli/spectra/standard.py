@@ -25,7 +25,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vcam_cli.physics.cache import remembered
+from vcam_cli.cache import remembered
 from vcam_cli.spectra.integration import integral
 from vcam_cli.spectra.spectrum import Floats, Outside, Spectrum, Table
 from vcam_cli.spectra.text import read_rows

@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.cache import remembered
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.color_errors import WavelengthTable
 from vcam_cli.camera.derived.geometry import Geometry
@@ -30,7 +31,6 @@ from vcam_cli.effects.optics.wavefront_blur import (
     wavefronts,
 )
 from vcam_cli.physics import zernike
-from vcam_cli.physics.cache import remembered
 from vcam_cli.physics.zernike import Terms
 
 TYPICAL_CHANGE = 0.1

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vcam_cli.arrays import Array
+from vcam_cli.cache import remembered
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.falloff import Falloff, falloff, falloffs_by_color
 from vcam_cli.camera.derived.geometry import Geometry
@@ -24,7 +25,6 @@ from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.pixel_signal import Gain, NeutralGain
 from vcam_cli.floats import rms
 from vcam_cli.physics import radiometry
-from vcam_cli.physics.cache import remembered
 
 ENTRIES = 1 << 17
 """Of the table of a measured falloff."""

@@ -13,13 +13,13 @@ from functools import cached_property
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.cache import ByteCache
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.blurs import PlaneTransfer
 from vcam_cli.effects.optics.wavefront_blur import AberrationBlur, largest_loss
 from vcam_cli.parallel import pieces
-from vcam_cli.physics.cache import ByteCache
 
 PSF = "optics.psf"
 """Key under which the camera carries the samples of its point spread function."""

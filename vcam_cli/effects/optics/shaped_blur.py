@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.cache import ByteCache
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import Effect, SignalLevels, of_kind
@@ -28,7 +29,6 @@ from vcam_cli.effects.optics.wavefront_blur import (
     uniform_wavefront,
 )
 from vcam_cli.physics import shaped_pupil, zernike
-from vcam_cli.physics.cache import ByteCache
 from vcam_cli.physics.opening import CIRCLE, Opening
 from vcam_cli.physics.shaped_pupil import OtfGrid
 

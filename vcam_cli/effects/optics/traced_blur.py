@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.cache import ByteCache
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.color_errors import WavelengthTable
 from vcam_cli.camera.derived.geometry import Geometry
@@ -31,7 +32,6 @@ from vcam_cli.lenses.wavefronts import ORDER, PlaceWavefront
 from vcam_cli.parallel import product
 from vcam_cli.physics import shaped_pupil
 from vcam_cli.physics.aberration import MAX_SLOPE
-from vcam_cli.physics.cache import ByteCache
 from vcam_cli.physics.interpolation import between_entries, lagrange
 from vcam_cli.physics.pupil_harmonics import direction_harmonics
 from vcam_cli.physics.shaped_pupil import OtfGrid

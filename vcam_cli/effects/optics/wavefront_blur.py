@@ -14,13 +14,13 @@ from typing import Self
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.cache import ByteCache
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.color_errors import WavelengthTable
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import Effect, SignalLevels, switched_off
 from vcam_cli.effects.blurs import PlaneTransfer, RadialTransfer
 from vcam_cli.physics import aberration, diffraction, ray_blur, zernike
-from vcam_cli.physics.cache import ByteCache
 from vcam_cli.physics.ray_spot import RaySpot
 from vcam_cli.physics.zernike import DEFOCUS, Terms
 

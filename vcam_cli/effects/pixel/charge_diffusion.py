@@ -24,12 +24,12 @@ from typing import Self
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.cache import remembered
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.photodiode import diffusion
 from vcam_cli.effects.blurs import RadialTransfer
 from vcam_cli.physics import silicon
-from vcam_cli.physics.cache import remembered
 
 
 @dataclass(frozen=True)

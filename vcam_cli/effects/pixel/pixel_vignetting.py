@@ -24,6 +24,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from vcam_cli.arrays import Array
+from vcam_cli.cache import remembered
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived import pixel_layout
 from vcam_cli.camera.derived.geometry import Geometry
@@ -31,7 +32,6 @@ from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.pixel_signal import NeutralGain
 from vcam_cli.floats import rms
 from vcam_cli.physics import vignetting
-from vcam_cli.physics.cache import remembered
 
 POINTS = (17, 33, 65)
 """Along each axis of the quadrant, as many as are needed."""

@@ -19,6 +19,7 @@ from itertools import pairwise
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.cache import remembered
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.blurs import PlaneTransfer, RadialTransfer
@@ -28,7 +29,6 @@ from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.transfer_tables import TableSize
-from vcam_cli.physics.cache import remembered
 from vcam_cli.scenes.base import ChartScene, SampledScene, Scene
 
 MARGIN_SHARE = 0.2

@@ -23,13 +23,13 @@ import numpy as np
 import scipy.fft
 
 from vcam_cli.arrays import Array
+from vcam_cli.cache import ByteCache
 from vcam_cli.camera.derived.geometry import pixel_centers
 from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.blurs import Blur, FieldTransfer
 from vcam_cli.image_formation.field_dependence import Map, field_along, linear, map_position
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.parallel import product
-from vcam_cli.physics.cache import ByteCache
 from vcam_cli.scenes.base import ChartScene, Scene
 from vcam_cli.scenes.charts.slanted_edge import half_plane_cover
 

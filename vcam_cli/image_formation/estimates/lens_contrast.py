@@ -10,11 +10,11 @@ from functools import partial
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.cache import ByteCache
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.blurs import Blur, PlaneTransfer, RadialTransfer
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.transfer_functions import Transfer
-from vcam_cli.physics.cache import ByteCache
 from vcam_cli.physics.pupil_harmonics import in_directions
 
 TURNS = 2

@@ -16,12 +16,12 @@ from functools import lru_cache, reduce
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.cache import ByteCache
 from vcam_cli.effects.blurs import SeparableTransfer
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.scene_spectrum import Pair, SceneSpectrum, pairs
 from vcam_cli.image_formation.transfer_tables import Tables, reader
 from vcam_cli.parallel import product
-from vcam_cli.physics.cache import ByteCache
 
 WIDTH = 1 / 20
 """Width of a block relative to its frequency: the lowest 40 terms are blocks of their own."""

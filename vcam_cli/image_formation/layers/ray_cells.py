@@ -17,6 +17,7 @@ import numpy as np
 import scipy.fft
 
 from vcam_cli.arrays import Array
+from vcam_cli.cache import ByteCache
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.blurs import Blur, SeparableTransfer
@@ -24,7 +25,6 @@ from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.image_formation.layers.occlusion import Place, Sums
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.transfer_functions import Transfer
-from vcam_cli.physics.cache import ByteCache
 
 BORDER = 4
 """Pixels around a window from which diffraction and diffusion bring light."""

@@ -25,7 +25,7 @@ from functools import lru_cache, partial
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.physics.cache import ByteCache
+from vcam_cli.cache import ByteCache
 from vcam_cli.scenes import discs
 from vcam_cli.scenes.base import Chart, Frame, PaintedCells
 from vcam_cli.scenes.cells import cell_edges

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vcam_cli.physics.cache import remembered
+from vcam_cli.cache import remembered
 
 
 def test_equal_arguments_are_computed_once_and_the_last_are_kept():
