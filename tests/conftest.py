@@ -9,7 +9,7 @@ import contextlib
 import gc
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -68,6 +68,19 @@ def figure_or_blank(path: Path | str, *args: Any, **options: Any) -> Iterator[An
 
 
 plots.plot_figure = figure_or_blank  # before other modules import it by its name
+drawn_svg = plots.svg
+
+
+def svg_or_blank(draw: Callable[[Any], None], size: tuple[float, float]) -> bytes:
+    """Return a drawing of a report, or a blank one in its place."""
+    if are_drawn:
+        return drawn_svg(draw, size)
+    with contextlib.suppress(_NotDrawnError):
+        draw(_Undrawn())
+    return b"<svg></svg>"
+
+
+plots.svg = svg_or_blank
 
 
 def is_quick(config: pytest.Config) -> bool:

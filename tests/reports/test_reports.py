@@ -92,7 +92,10 @@ def test_a_page_of_every_part_is_valid_and_escapes_what_it_shows():
         pytest.param("still-life", [], marks=pytest.mark.long),
         pytest.param("x3-stacked", [], marks=pytest.mark.long),
         ("starter", ["optics=none", "array.binning={rows: 2, columns: 2}"]),
-        ("starter", ["adc={bits: 10, kind: logarithmic}", "output.render=none", "quality=[]"]),
+        pytest.param(
+            *("starter", ["adc={bits: 10, kind: logarithmic}", "output.render=none", "quality=[]"]),
+            marks=pytest.mark.draws,
+        ),
         pytest.param(
             *("starter", ["scene.illuminant={monochromatic: 550 nm}"]), marks=pytest.mark.long
         ),
