@@ -7,6 +7,7 @@ from io import BytesIO
 import numpy as np
 import pytest
 from cameras import camera, image_of
+from making import long_except
 from PIL import Image, ImageCms
 from typer.testing import CliRunner
 
@@ -37,7 +38,7 @@ def mutated(seed: int) -> bytes:
     return bytes(data)
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", long_except(range(12), range(40)))
 def test_a_harmed_profile_ends_in_a_frame_or_a_line(seed, tmp_path):
     body = b"icc\0\0" + zlib.compress(mutated(seed))
     chunk = struct.pack(">I", len(body)) + b"iCCP" + body

@@ -155,7 +155,7 @@ def test_a_tighter_accuracy_is_never_worse(tmp_path):
         assert tight <= loose + 3e-4  # which the truth errs
 
 
-@pytest.mark.parametrize("period", [8, 16, 32])
+@pytest.mark.parametrize("period", long_except([8, 32], [8, 16, 32]))
 @pytest.mark.parametrize("angle", [0.0, np.pi / 2])
 @pytest.mark.parametrize(("rings", "sectors", "error"), [(4, 8, 8e-3), (8, 16, 4e-3)])
 def test_waves_diffract_from_rays_between_pairs_of_points(period, angle, rings, sectors, error):

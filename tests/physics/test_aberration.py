@@ -306,7 +306,14 @@ def test_rays_of_defocus_fill_a_disk():
     assert ray_blur.blur_radius(terms, N) == pytest.approx(shift / (2 * N), rel=1e-9)
 
 
-@pytest.mark.parametrize("terms", [((11, 1e-6),), ((8, 1e-6), (5, 3e-7), (2, 4e-7)), ((9, 2e-6),)])
+@pytest.mark.parametrize(
+    "terms",
+    [
+        ((11, 1e-6),),
+        ((8, 1e-6), (5, 3e-7), (2, 4e-7)),
+        pytest.param(((9, 2e-6),), marks=pytest.mark.long),
+    ],
+)
 def test_rays_against_points_of_the_pupil(terms):
     x, y = _disk(1200)
     right, down = (2 * N * slope for slope in zernike.gradient(terms, x, y))

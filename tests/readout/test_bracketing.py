@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from making import camera, radiance_for
+from making import camera, long_except, radiance_for
 
 from vcam_cli import simulate
 from vcam_cli.errors import BadInput
@@ -43,7 +43,13 @@ def test_each_exposure_is_the_frame_of_its_time(tmp_path) -> None:
 
 
 @pytest.mark.parametrize("rule", ["snr", "switch"])
-@pytest.mark.parametrize("electrons", [300, 19_500, 20_000, 20_400, 1e5, 199_000, 202_000, 1e6])
+@pytest.mark.parametrize(
+    "electrons",
+    long_except(
+        [300, 20_000, 20_400, 199_000, 1e6],
+        [300, 19_500, 20_000, 20_400, 1e5, 199_000, 202_000, 1e6],
+    ),
+)
 def test_merged_mean_is_unbiased_through_the_switches(rule, electrons, tmp_path) -> None:
     """Within five standard errors, 0.25 % or less, of 40 000 pixels, clipping included."""
     exposure = PIXEL["exposure"] | {"merge": rule}
