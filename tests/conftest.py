@@ -38,6 +38,8 @@ BLANK = {"png": b"\x89PNG\r\n\x1a\n", "svg": b"<?xml", "pdf": b"%PDF"}
 drawn_figure = plots.plot_figure
 are_drawn = True
 """Whether plots are drawn in the test that runs."""
+kept_bytes = 0
+"""What `shared.KEPT` is where no test is run."""
 
 
 class _NotDrawnError(BaseException):
@@ -94,9 +96,18 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Draw plots in tests with the mark `draws` and in their fixtures, and in all `long` runs."""
-    global are_drawn
+    """Draw plots in tests with the mark `draws` and in their fixtures, and in all `long` runs.
+
+    Keep no light from one simulation to the next, but in tests of what is kept: tests that change
+    the engine between two frames of one camera would compare one light. (No fixture that all tests
+    use: it takes a third of the time of a test that does nothing.)
+    """
+    global are_drawn, kept_bytes
     are_drawn = "draws" in item.keywords or not is_quick(item.config)
+    if shared := sys.modules.get("vcam_cli.simulation.shared"):
+        kept_bytes = kept_bytes or shared.KEPT
+        shared.KEPT = kept_bytes if "keeps_light" in item.keywords else 0
+        shared.RECENT.clear()
 
 
 def pytest_collection_finish() -> None:
@@ -109,19 +120,3 @@ def pytest_collection_finish() -> None:
     atexit.register(gc.unfreeze)
     gc.set_threshold(20_000)
     gc.enable()
-
-
-@pytest.fixture(autouse=True)
-def nothing_kept(request, monkeypatch):
-    """Keep no light from one simulation to the next, but in tests of what is kept.
-
-    Tests that change the engine between two frames of one camera would compare one light.
-    """
-    if "keeps_light" in request.keywords:
-        from vcam_cli.simulation.shared import RECENT
-
-        RECENT.clear()
-        return
-    if module := sys.modules.get("vcam_cli.simulation.shared"):
-        monkeypatch.setattr(module, "KEPT", 0)
-        module.RECENT.clear()

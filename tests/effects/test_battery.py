@@ -527,19 +527,27 @@ def only(*names: str) -> dict[str, str]:
     return {kind.name: "on" if kind.name in names else "off" for kind in DRAWS}
 
 
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    """The mean, and what each source adds to it that is drawn alone, by name."""
+    folder = tmp_path_factory.mktemp("alone")
+    mean = electrons(folder, effects=QUIET)
+    added = {k.name: electrons(folder, effects=only(k.name)) - mean for k in IN_CHARGE}
+    return mean, added
+
+
 @every_draw
-def test_switching_one_off_leaves_the_draws_of_the_others(kind, tmp_path):
+def test_switching_one_off_leaves_the_draws_of_the_others(kind, alone, tmp_path):
     """Each draw is what it is alone, added to the mean, in every block of rows of a whole frame.
 
     Offsets and no gains here, so that all draws add up; 1e-9 is rounding of numbers near 1000.
     """
-    mean = electrons(tmp_path, effects=QUIET)
-    alone = {k.name: electrons(tmp_path, effects=only(k.name)) - mean for k in IN_CHARGE}
+    mean, added = alone
     others = [k.name for k in IN_CHARGE if k is not kind]
-    expected = mean + sum(alone[name] for name in others)
+    expected = mean + sum(added[name] for name in others)
     found = electrons(tmp_path, effects={kind.name: "off"})
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)
-    assert kind.behind_well or np.abs(alone[kind.name]).max() > 1
+    assert kind.behind_well or np.abs(added[kind.name]).max() > 1
 
 
 def test_gain_noise_keeps_its_draws_when_light_is_noisy(tmp_path):

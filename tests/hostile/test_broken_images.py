@@ -46,10 +46,10 @@ def fuzzed(first: int, last: int) -> tuple[int, int]:
 
 
 def test_harmed_files_of_every_format_are_read_or_refused():
-    """Some 2000 of them; what is read is finite light."""
-    read, refused = fuzzed(0, 6)
-    assert read > 300
-    assert refused > 1000
+    """Some 700 of them; what is read is finite light."""
+    read, refused = fuzzed(0, 2)
+    assert read > 100
+    assert refused > 300
 
 
 @pytest.mark.long

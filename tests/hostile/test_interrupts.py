@@ -154,7 +154,7 @@ def test_a_first_run(number, vcam, folder):
     """There was nothing before: after an interrupt not even the folder is there."""
     longest = vcam(folder, *RUN, "expected")["seconds"]
     out, stops = folder / "deep" / "out", 0
-    for tries, moment in enumerate(moments_over(longest, 5, number)):
+    for tries, moment in enumerate(moments_over(longest, 3, number)):
         after = sooner(moment, tries, stops)
         done = vcam(folder, *RUN, "deep/out", signal=number, after=after)
         stops += ended(done, number, vcam, out)

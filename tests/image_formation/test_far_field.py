@@ -104,8 +104,21 @@ def test_rings_tile_the_margin(shape, pitch, blurs):
     assert sum(math.prod(part.scene.shape) for part in parts) < 3e5
 
 
-@pytest.mark.parametrize("blurs", BLURS)
-@pytest.mark.parametrize("name", CHARTS)
+SLOW = {
+    *(("edge", "f/8"), ("edge", "defocus"), ("edge", "beside its place"), ("lamp", "f/8")),
+    *(("rectangles", "beside its place"), ("patches", "beside its place")),
+}
+"""Charts and blurs that take longest, and find what others do."""
+
+
+@pytest.mark.parametrize(
+    ("name", "blurs"),
+    [
+        pytest.param(name, blurs, marks=pytest.mark.long if (name, blurs) in SLOW else ())
+        for name in CHARTS
+        for blurs in BLURS
+    ],
+)
 def test_the_light_of_rings_is_that_of_fine_cells(name, blurs, monkeypatch):
     """Against the whole chart on the cells of its near field.
 
