@@ -1,10 +1,11 @@
 """Blurs that have a direction or change over the field, against sums in space."""
 
+import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from making import camera
+from making import camera, long_except
 from optical_paths import GRAY, Gaussian, Leaning
 from scipy.special import erf
 
@@ -117,8 +118,17 @@ def through(x, y, tables, spectrum) -> np.ndarray:
 
 
 @pytest.mark.parametrize("axes", AXES)
-@pytest.mark.parametrize("name", BLURS)
-@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize(
+    ("name", "dtype"),
+    long_except(
+        [
+            *(("wide", np.float32), ("right", np.float32)),
+            *(("down", np.float64), ("slanted", np.float64)),
+        ],
+        itertools.product(BLURS, [np.float64, np.float32]),
+        several=True,
+    ),
+)
 def test_a_blur_of_the_plane_is_its_spread_in_space(name, axes, dtype):
     allowed = 2e-4
     blur, (x, y) = BLURS[name], AXES[axes]

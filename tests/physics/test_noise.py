@@ -24,12 +24,12 @@ def total_variation(mean, dtype=np.float64, count=2_000_001):
     [
         # Exact inversion: what is left is the grid of 2e6 quantiles, about 1e-5.
         (1e-3, 2e-5),
-        (0.5, 2e-5),
+        pytest.param(0.5, 2e-5, marks=pytest.mark.long),
         (3.0, 2e-5),
         (7.99, 2e-5),
         # Expansion: 8e-4 at 8, 5e-5 at 50 (third-order term left out falls as m^-3/2).
         (8.0, 1e-3),
-        (50.0, 1e-4),
+        pytest.param(50.0, 1e-4, marks=pytest.mark.long),
         (2500.0, 5e-5),
     ],
 )

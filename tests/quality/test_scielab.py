@@ -235,8 +235,17 @@ def test_of_the_coarsest_pixels_each_is_judged_alone(filters: str) -> None:
     np.testing.assert_allclose(found, alone, rtol=1e-4)
 
 
-@pytest.mark.parametrize("filters", READINGS)
-@pytest.mark.parametrize("degree", [1e-44, 1e-3, 0.3, 1.0, 7.0, 40.0, 1e4, 1e6])
+@pytest.mark.parametrize(
+    ("degree", "filters"),
+    [
+        pytest.param(
+            *(degree, filters),
+            marks=pytest.mark.long if degree == 1e6 and filters != "isetcam" else (),
+        )
+        for degree in (1e-44, 1e-3, 0.3, 1.0, 7.0, 40.0, 1e4, 1e6)
+        for filters in READINGS
+    ],
+)
 def test_memory_is_bounded_and_known(filters: str, degree: float) -> None:
     """However few or many pixels are a degree, 16 x 18 of them take some megabytes."""
     one, other = np.random.default_rng(6).random((2, 16, 18, 3), np.float32)
