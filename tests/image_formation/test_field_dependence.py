@@ -88,7 +88,7 @@ PRESETS = {"draft": (DRAFT, 0.02), "standard": (STANDARD, 0.005), "reference": (
 @pytest.mark.parametrize(
     ("preset", "places"),
     long_except(
-        [("draft", "even"), ("reference", "uneven"), ("standard", "steep")],
+        [("draft", "even"), ("standard", "steep")],
         itertools.product(PRESETS, PLACES),
         several=True,
     ),
@@ -131,6 +131,7 @@ FAR = 300e-6
             ((1.6e-6, 0.0), (0.0, 1.1e-6)),
             ((0.8e-6, 0.55e-6), (-0.8e-6, 0.55e-6), (0.8e-6, -0.55e-6), (-0.8e-6, -0.55e-6)),
             id="both axes",
+            marks=pytest.mark.long,
         ),
     ],
 )

@@ -118,11 +118,17 @@ def dense_mtf(view, angle, wave, oracle, samples=256):
 
 
 @pytest.mark.parametrize(
-    "name", long_except(["cooke-triplet"], ["cooke-triplet", "double-gauss", "topogon"])
+    ("name", "every"),
+    long_except(
+        [("cooke-triplet", 3)],
+        [("cooke-triplet", 3), ("cooke-triplet", 1), ("double-gauss", 1), ("topogon", 1)],
+        several=True,
+    ),
 )
-def test_mtf_is_that_of_the_oracles_wavefronts(name):
+def test_mtf_is_that_of_the_oracles_wavefronts(name, every):
+    """Of every so many of them, the first one among these."""
     view = small(name)
-    for degrees, micrometers, oracle in ORACLE[name]["wavefronts"]:
+    for degrees, micrometers, oracle in ORACLE[name]["wavefronts"][::every]:
         angle, wave = np.array([math.radians(degrees)]), np.array([micrometers * 1e-6])
         height = view.heights(angle, np.array([view.lens.primary]))[0]
         found = trace_field(view, height, wave[0], wave[0], vignetted=False).at(0)

@@ -150,7 +150,7 @@ CAMERAS = {
     for chart in CHARTS
     for each in (random_camera(chart, number) for number in range(len(CHARTS[chart])))
 } | {each.name: each for each in (random_camera("hdr-patches", *hard) for hard in HARD)}
-_QUICK_ENDS = ("1", "2", "7", "51")
+_QUICK_ENDS = ("1", "7", "51")
 QUICK = {
     name
     for name, each in CAMERAS.items()
