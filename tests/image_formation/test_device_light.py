@@ -58,15 +58,15 @@ def both(camera):
     ("name", "sets"),
     [
         ("starter", ()),  # a spectrum in closed form
-        ("still-life", ()),  # painted cells
+        pytest.param("still-life", (), marks=pytest.mark.long),  # painted cells
         # photographs at reference, below, have 64 bits, too
         pytest.param("still-life", ("accuracy={float_width: 64}",), marks=pytest.mark.long),
         ("everything", ()),  # a lens that changes over the field
         ("street", ()),  # a rolling shutter in motion: every row at another place
-        ("x3-stacked", ()),  # every pixel with every color
+        pytest.param("x3-stacked", (), marks=pytest.mark.long),  # every pixel with every color
         ("cfa-honeycomb", ()),
         ("table-top", ()),  # layers in depth
-        ("fisheye", ()),  # painted through distortion
+        pytest.param("fisheye", (), marks=pytest.mark.long),  # painted through distortion
         ("starter", (ROLL,)),  # looked up by splines at instants
     ],
 )

@@ -30,11 +30,11 @@ def fake(monkeypatch):
     [
         ("starter", []),
         ("everything", []),
-        ("x3-stacked", []),
+        pytest.param("x3-stacked", [], marks=pytest.mark.long),
         ("kai-02170", []),
         ("street", ["pixel.blooming=30 %"]),
         ("imx900", ["array.binning={rows: 2, columns: 2, kind: digital}"]),
-        ("cfa-honeycomb", []),
+        pytest.param("cfa-honeycomb", [], marks=pytest.mark.long),
     ],
 )
 def test_a_frame_of_a_device(fake, name, sets):
