@@ -204,11 +204,19 @@ REQUIRED = sorted(
 )
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A result, and the bytes of its raw.dng."""
+    result, path = taken(tmp_path_factory.mktemp("whole"))
+    return result, path.read_bytes()
+
+
 @pytest.mark.parametrize("name", REQUIRED)
-def test_a_missing_tag_fails_the_gate(name, tmp_path, capfd):
-    result, path = taken(tmp_path)
+def test_a_missing_tag_fails_the_gate(name, whole, tmp_path, capfd):
+    result, data = whole
+    path = tmp_path / "raw.dng"
     code = {"CFARepeatPatternDim": 33421, "CFAPattern": 33422}.get(name) or CODES[name][0]
-    path.write_bytes(without(path.read_bytes(), code))
+    path.write_bytes(without(data, code))
     assert complaints(path, result, capfd, round(result.metrics["base_iso"]))
 
 
