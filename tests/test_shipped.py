@@ -118,16 +118,7 @@ TRACED = {"double-gauss", "phone-double-gauss"}
 """Lenses by prescriptions, which take seconds; test_traced_frames.py has frames through one."""
 
 
-SIBLINGS = {
-    *("canon-5d4", "canon-700d", "canon-70d", "olympus-e300", "sony-a7s2"),  # as nikon-d850
-    *("imx219", "imx477", "imx708"),  # as imx586 and imx900
-    *("csf-0.18um", "csf-0.25um", "csf-0.35um", "csf-monochrome"),  # as csf-color-0.35um
-    *("colorchecker-a", "colorchecker-fl2"),  # as colorchecker-d65
-}
-"""Cameras that another one is like, in all but numbers."""
-
-
-@pytest.mark.parametrize("name", long_except(set(CAMERAS) - TRACED - SIBLINGS, CAMERAS))
+@pytest.mark.parametrize("name", long_except(set(CAMERAS) - TRACED, CAMERAS))
 def test_a_camera_runs(name, tmp_path):
     """And the picture has dark and light areas, and is not mostly clipped."""
     line = ["run", name, "-q", "-o", str(tmp_path / "out")]
