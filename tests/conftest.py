@@ -9,7 +9,7 @@ import contextlib
 import gc
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -99,8 +99,8 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
     """Draw plots in tests with the mark `draws` and in their fixtures, and in all `long` runs.
 
     Keep no light from one simulation to the next, but in tests of what is kept: tests that change
-    the engine between two frames of one camera would compare one light. (No fixture that all tests
-    use: it takes a third of the time of a test that does nothing.)
+    the engine between two frames of one camera would compare one light. A fixture that all tests
+    use would do the same and take time in each.
     """
     global are_drawn, kept_bytes
     are_drawn = "draws" in item.keywords or not is_quick(item.config)
@@ -108,6 +108,17 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
         kept_bytes = kept_bytes or shared.KEPT
         shared.KEPT = kept_bytes if "keeps_light" in item.keywords else 0
         shared.RECENT.clear()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Leave out of reports the keywords, which nobody reads there.
+
+    To send them from worker to main process takes a sixth of the time of a test that does nothing.
+    """
+    report = yield
+    report.keywords = {}
+    return report
 
 
 def pytest_collection_finish() -> None:
