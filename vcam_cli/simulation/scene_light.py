@@ -233,14 +233,14 @@ def formed_light(
             else:
                 key = seen.light_key + run.device.key
                 light = run.rate_cache.rate(key, seen.path.ceiling, form)
-            full = _largest_read(seen, light.values)
-            better = _widened(_judged_by(full, seen, light), picture, full)
+            full = _largest_signal(seen, light.values)
+            better = _widened(_with_full_signal(full, seen, light), picture, full)
         if better is seen:
             return seen, light
         seen = better
 
 
-def _largest_read(seen: SceneLight, light: Array) -> float:
+def _largest_signal(seen: SceneLight, light: Array) -> float:
     """Return the largest mean light of pixels that are read as one, at most what fills them [e/s].
 
     `light` is that of every place of the lattice [e/s].
@@ -255,7 +255,7 @@ def _largest_read(seen: SceneLight, light: Array) -> float:
     return min(float(light.max(initial=0.0)), ceiling)
 
 
-def _judged_by(full: float, seen: SceneLight, light: photon_rate.Rate) -> SceneLight:
+def _with_full_signal(full: float, seen: SceneLight, light: photon_rate.Rate) -> SceneLight:
     """Return the scene with the full signal by which light is to be formed; itself where it was.
 
     `full` is that of pixels that are read as one [e/s].
