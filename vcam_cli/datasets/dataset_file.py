@@ -41,7 +41,7 @@ def _refuse_others(root: Node) -> None:
 
 FORMAT = FileFormat(model=Dataset, kind="studies", refuse=_refuse_others)
 KEPT_FRAMES = 1 << 12
-"""Drawn frames that are kept, 4 MB: each is asked for when work is divided, done and listed."""
+"""Drawn frames that are kept, 4 MB: work needs each when it is divided, done and listed."""
 
 
 @dataclass(frozen=True)
