@@ -329,13 +329,16 @@ class ProductSpectrum:
             Sums (pairs, len(y) - 1, len(x) - 1), in the order of the pairs.
         """
         planes, runs, columns = self.along_x.shape
-        in_rows = _sums_of_products(self.along_y.T, y).reshape(-1, runs**2)
         in_columns = _sums_of_products(self.along_x.reshape(-1, columns), x)
         in_columns = in_columns.reshape(-1, planes, runs, planes, runs)
-        out = [
-            product(in_rows, in_columns[:, r, :, s].reshape(-1, runs**2).T)
-            for r, s in of or pairs(planes)
-        ]
+        # Along y the sums are the same for two functions in either order: a third of the time.
+        one, other = np.triu_indices(runs)
+        in_rows = _sums_of_products(self.along_y.T, y)[:, one, other]
+        in_rows[:, one == other] /= 2
+        out = []
+        for r, s in of or pairs(planes):
+            both = in_columns[:, r, :, s]
+            out.append(product(in_rows, (both[:, one, other] + both[:, other, one]).T))
         return np.array(out)
 
 

@@ -347,7 +347,10 @@ class PartReader:
         assert self.radial is not None
         tables, (entries, steps, lit) = self.tables, self.radial
         last = steps.shape[-1]
-        position = np.minimum(np.hypot(fx, fy[:, None]).ravel() * (last / tables.top), last)
+        position = np.add(np.square(fx), np.square(fy)[:, None]).ravel()
+        np.sqrt(position, out=position)  # in a quarter of the time of `hypot`
+        position *= last / tables.top
+        np.minimum(position, last, out=position)
         index = np.minimum(position.astype(np.intp), last - 1)
         values = steps.take(index, axis=-1)
         values *= position - index

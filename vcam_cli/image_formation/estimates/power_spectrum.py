@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache, reduce
+from functools import cached_property, lru_cache, reduce
 
 import numpy as np
 
@@ -45,6 +45,16 @@ class Blocks:
     def places(self) -> tuple[Array, Array, Array]:
         """Frequencies (n,) at the lower ends of blocks, in the middle, at the upper ends [1/m]."""
         return self.low, (self.low + self.high) / 2, self.high
+
+    @cached_property
+    def own_weights(self) -> Array | None:
+        """The weights (n,) where each block of terms is one of coefficients; None elsewhere."""
+        diagonal = np.diagonal(self.weights)
+        is_one = (
+            self.weights.shape == 2 * diagonal.shape
+            and not (self.weights - np.diag(diagonal)).any()
+        )
+        return diagonal if is_one else None
 
 
 ReadTables = Callable[[Tables, int, Blocks, Blocks, int], Array]
@@ -203,8 +213,10 @@ class PowerSpectrum:
         for parity in tables.parities:
             values = (read or _values)(tables, parity, self.x, self.y, place)
             for (r, s), squares in zip(self.pairs, self.products, strict=True):
-                seen = tables.is_seen[r] & tables.is_seen[s]
-                colors = slice(None) if seen.all() else np.flatnonzero(seen)
+                seen = np.flatnonzero(tables.is_seen[r] & tables.is_seen[s])
+                if not len(seen):
+                    continue
+                colors = slice(seen[0], seen[-1] + 1)  # others between them add 0
                 both = values[r, colors] * values[s, colors]
                 both *= squares
                 power[colors] += both
@@ -372,6 +384,13 @@ def _largest_squares(transfer: Callable[[Array], Array], blocks: Blocks) -> Arra
     return np.asarray(np.square([transfer(f) for f in blocks.places]).max(axis=0))
 
 
+def _weighted(sums: Array, x: Blocks, y: Blocks) -> Array:
+    """Return sums over blocks of coefficients as mean squares of blocks of terms."""
+    if x.own_weights is None or y.own_weights is None:
+        return product(y.weights, product(sums, x.weights.T))
+    return np.asarray(sums * x.own_weights * y.own_weights[:, None])  # in a tenth of the time
+
+
 def power_spectrum(
     spectrum: SceneSpectrum,
     x: Axis,
@@ -406,6 +425,5 @@ def power_spectrum(
     sums = spectrum.products(along_y.edges, along_x.edges, workers, every)
     for (r, s), of_pair in zip(every, sums, strict=True):
         twice = 1 if r == s else 2
-        squares = product(along_y.weights, product(of_pair, along_x.weights.T))
-        products.append(twice * squares)
+        products.append(twice * _weighted(of_pair, along_x, along_y))
     return PowerSpectrum(along_x, along_y, np.array(products), every, tuple(separable))

@@ -225,8 +225,10 @@ def _composed(
         np.minimum(part, clear[here], out=part)
         brightest = max(one.brightest for one in scene.parts[layer.number + 1 :])
         widest[here] += (white * brightest) * part
-        rows, columns = (np.arange(s.start, s.stop) // SIDE for s in here)
-        part *= spread[layer.number].astype(part.dtype)[rows[:, None], columns]
+        behind = spread[layer.number].astype(part.dtype)
+        for axis, some in enumerate(here):
+            behind = np.repeat(behind, SIDE, axis)[(slice(None),) * axis + (some,)]
+        part *= behind
         bound[here] += part
         clear[here] *= 1 - layer.cover.min(axis=0)
     for layer in reversed(layers):

@@ -432,8 +432,10 @@ class SharpImage:
             response: Array = self._transfer.plane_response(fx, fy)[0]
             return response
         lengths, known = self._radial(cells.sides)
-        length = np.hypot(fx[None], fy[:, None])
-        return np.stack([np.interp(length, lengths, one) for one in known])
+        half = len(fy) // 2 + 1  # the other half has the same lengths, in reverse
+        length = np.hypot(fx, fy[:half, None])
+        found = np.stack([np.interp(length, lengths, one) for one in known])
+        return np.concatenate([found, found[:, len(fy) - half : 0 : -1]], axis=1)
 
     def _radial(self, sides: tuple[float, float]) -> tuple[Array, Array]:
         """Return frequencies (n,), up to the highest on cells [cycles/m], and the response there.
