@@ -197,13 +197,23 @@ def extremes_within(values: Array, y: Spans, x: Spans) -> tuple[Array, Array]:
     """
     found = []
     for pick in (np.minimum, np.maximum):
-        plane = values
-        for axis, spans in ((-2, y), (-1, x)):
-            pairs, places = np.unique(np.stack(spans), axis=1, return_inverse=True)
-            lines = [
-                pick.reduce(plane.take(range(first, last + 1), axis=axis), axis=axis)
-                for first, last in pairs.T.tolist()
-            ]
-            plane = np.stack(lines, axis=axis).take(places.ravel(), axis=axis)
-        found.append(plane)
+        columns = _extremes_along(pick, values, *x)
+        lines = _extremes_along(pick, columns.swapaxes(-1, -2), *y)
+        found.append(lines.swapaxes(-1, -2))
     return found[0], found[1]
+
+
+def _extremes_along(pick: np.ufunc, values: Array, first: Array, last: Array) -> Array:
+    """Return the extremes (..., m) of values (..., n) from the first of some places to the last.
+
+    Two runs of a power of 2 make each.
+    """
+    out = np.empty((*values.shape[:-1], len(first)), values.dtype)
+    powers, length = np.frexp(last - first + 1)[1] - 1, 1
+    for power in range(int(powers.max(initial=0)) + 1):
+        some = np.flatnonzero(powers == power)
+        at_ends = (values.take(at[some], axis=-1) for at in (first, last + 1 - length))
+        out[..., some] = pick(*at_ends)
+        values = pick(values[..., :-length], values[..., length:])
+        length *= 2
+    return out

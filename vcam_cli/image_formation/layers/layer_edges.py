@@ -100,10 +100,13 @@ def partly_hidden(
     """
     low, high = _opacity_range(g, chart, optics, window)
     out: Array = np.zeros_like(mean[0])
-    varied = high - low > EVEN
-    least, spread = low[varied], (high - low)[varied]
-    share = np.clip((mean[:, varied] - least) / spread, 0, 1)
-    out[varied] = spread * (share * (1 - share)).max(axis=0)
+    apart = high - low
+    varied = np.flatnonzero(apart > EVEN)
+    least, spread = low.take(varied), apart.take(varied)
+    share = mean.reshape(len(mean), -1).take(varied, axis=1) - least
+    share /= spread
+    np.clip(share, 0, 1, out=share)
+    out.flat[varied] = spread * (share * (1 - share)).max(axis=0)
     return out
 
 
