@@ -303,7 +303,9 @@ class Filter:
                 continue
             nodes, shares = chebyshev(fy) if len(fy) >= SHORTEST else (fy, np.eye(len(fy)))
             shares = device.put(shares * below[stretch, None], dtype)
-            values = device.put(table.values(nodes, count) * factor[:count], dtype)
+            read = table.values(nodes, count)
+            read *= factor[:count]
+            values = device.put(read, dtype)
             longest = LONGEST if device.whole else rows_at_once(count)
             for part in slices_within(stretch, longest):
                 index = _consecutive(self.y.coefficient_index(terms[part])[0])

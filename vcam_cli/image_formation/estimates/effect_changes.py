@@ -49,11 +49,13 @@ def changes_by_omission(
     squares: dict[Effect, Array] = {
         effect: image.power.omission_power(behind_lens, effect) for effect in path.separable
     }
-    for effect in of_kind(path.effects, RadialTransfer):
+    radial = of_kind(path.effects, RadialTransfer)
+    by_length = image.power.by_length(image.tables) if radial else np.empty(0)
+    for effect in radial:
         rest = _omission_tables(
             path, image, [e for e in path.transfer.radial_blurs if e is not effect]
         )
-        squares[effect] = image.power.filtered_power(rest)
+        squares[effect] = _radial_power(image, rest, by_length)
     if directed := of_kind(path.effects, PlaneTransfer, FieldTransfer):
         squares |= dict.fromkeys(
             directed, image.power.filtered_power(_directional_tables(path, tables))
@@ -72,6 +74,17 @@ def _omission_tables(
     others = path.transfer.with_effects(radial).with_mixtures(image.tables.mix)
     size = TableSize(image.tables.top, whole.shape[-1], 0.0, 0.0)
     return replace(image.tables, radial=radial_table(others, size) - whole)
+
+
+def _radial_power(image: SampledImage, tables: Tables, by_length: Array) -> Array:
+    """Return the mean squares (C,) of what tables over |f| pass [(e/s)^2].
+
+    By the lengths of frequencies it takes a quarter of the time of `filtered_power`.
+    """
+    total: Array = np.zeros(tables.colors)
+    for (r, s), squares in zip(image.power.pairs, by_length, strict=True):
+        total += (tables.radial[r] * tables.radial[s]) @ squares
+    return np.maximum(total, 0)
 
 
 def _directional_tables(path: OpticalPath, tables: Tables) -> Tables:

@@ -142,6 +142,34 @@ class PowerSpectrum:
         """
         return self.pixel_power(self._passed_power(tables, 1, _read_tables))
 
+    def by_length(self, tables: Tables) -> Array:
+        """Return the power by the length of frequencies, at the entries of tables over |f|.
+
+        Each block counts at the two entries beside its middle, behind the separable functions.
+
+        Parameters
+        ----------
+        tables : Tables
+            Tables over |f|.
+
+        Returns
+        -------
+        Array
+            Mean squares (pairs, entries) of the planes.
+        """
+        count = tables.radial.shape[-1]
+        length = np.hypot(self.x.places[1], self.y.places[1][:, None]).ravel()
+        place = np.minimum(length * ((count - 1) / tables.top), count - 1)
+        first = np.minimum(place.astype(np.intp), count - 2)
+        beyond, found = place - first, np.empty((len(self.products), count))
+        passed = self._separable_squares(self.separable)
+        for own, squares in zip(found, self.products, strict=True):
+            power = (squares * passed).ravel()
+            second = power * beyond
+            own[:] = np.bincount(first, power - second, count)
+            own += np.bincount(first + 1, second, count)
+        return found
+
     def lens_power(self, tables: Tables) -> Array:
         """Return the mean squares before the separable transfer functions.
 
