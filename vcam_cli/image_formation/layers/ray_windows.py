@@ -349,9 +349,10 @@ def windows_with(bound: Array, allowed: float) -> tuple[list[Window], float]:
         Bound on the skipped covariance, rms over the array, in the same unit.
     """
     rows, columns = bound.shape
-    tops, lefts = np.arange(0, rows, SIDE), np.arange(0, columns, SIDE)
-    squares = np.add.reduceat(np.square(bound, dtype=float), tops, axis=0)
-    squares = np.add.reduceat(squares, lefts, axis=1)
+    whole = np.zeros((-(-rows // SIDE) * SIDE, columns))
+    np.square(bound, dtype=float, out=whole[:rows])
+    squares = whole.reshape(-1, SIDE, columns).sum(axis=1)
+    squares = np.add.reduceat(squares, np.arange(0, columns, SIDE), axis=1)
     order = np.argsort(squares, axis=None)
     sums = np.cumsum(squares.ravel()[order])
     out = order[sums <= allowed**2 * bound.size]
@@ -371,8 +372,8 @@ def windows_with(bound: Array, allowed: float) -> tuple[list[Window], float]:
 def _rectangles(kept: Array) -> Iterator[tuple[int, int, int, int]]:
     """Yield rectangles (top, bottom, left, right) that together are all that is kept."""
     kept = kept.copy()
-    while kept.any():
-        top, left = (int(at[0]) for at in np.nonzero(kept))
+    while kept.flat[first := int(kept.argmax())]:
+        top, left = divmod(first, kept.shape[1])
         bottom, right = top, left
         while right < min(left + LONGEST, kept.shape[1]) and kept[top, right]:
             right += 1
