@@ -152,8 +152,8 @@ def layered_image(
     full = min(KEPT * float(light.max(initial=0.0)), path.ceiling)
     usable, least = path.usable_error * full, RAYS_SHARE * tolerance * full
     allowed = math.sqrt(max(usable**2 - own**2, least**2))
-    windows, left_out = windows_with(bound, LEFT_OUT * allowed)
     border, beyond = border_around(path, _end(g, scene), rms(widest), allowed)
+    windows, left_out = windows_with(bound, LEFT_OUT * allowed, border)
     if any(map(moves_otherwise, path.layers)):  # at rest they would hide other light of each other
         windows, left_out = [], rms(widest)
     far = [max(lengths) for lengths in zip(*map(ray_reach, path.layers), strict=True)]
