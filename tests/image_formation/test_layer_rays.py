@@ -424,6 +424,24 @@ def test_what_moving_layers_hide_is_the_mean_over_instants(tmp_path):
     assert error <= 0.002
 
 
+@pytest.mark.parametrize("chart", long_except(["eye-chart"], ["dead-leaves", "eye-chart"]))
+def test_layers_beside_the_array_are_not_seen(chart, tmp_path):
+    """Charts need not know what they show at no places at all."""
+    even = {"source": {"kind": "chart", "chart": "uniform"}, "distance": "2 m"}
+    beside = {
+        "source": {"kind": "chart", "chart": chart},
+        "distance": "0.8 m",
+        "width": "10 mm",
+        "position": ["2 m", "2 m"],
+    }
+    given = {"scene.radiance": radiance_for(5000), "effects": QUIET, "accuracy": "draft"}
+    found = [
+        simulate(camera(tmp_path, given | {"scene.source": source})).frame.mean_electrons
+        for source in ({"kind": "layers", "layers": [beside, even]}, even["source"])
+    ]
+    np.testing.assert_allclose(*found, rtol=1e-5)
+
+
 @pytest.mark.parametrize("f_number", long_except([1000], [1000, 3000]))
 def test_what_a_cut_margin_changes_is_predicted(f_number, tmp_path, monkeypatch):
     """Behind such a lens light comes from hundreds of arrays around: against so wide a margin."""

@@ -400,7 +400,8 @@ class FlatLayers(Chart):
             ends = zip((x, y), part.chart.center, (part.size.width, part.size.height), strict=True)
             columns, rows = (np.flatnonzero(np.abs(at - c) <= size / 2) for at, c, size in ends)
             found: Array = np.zeros((len(weights), len(y), len(x)), weights.dtype)
-            found[:, rows[:, None], columns] = part.chart.values(x[columns], y[rows], weights)
+            if len(columns) and len(rows):  # charts know no empty places
+                found[:, rows[:, None], columns] = part.chart.values(x[columns], y[rows], weights)
             return found
 
         return self._compose(mix, look)
