@@ -11,7 +11,7 @@ from optical_paths import PITCH as PIXEL_PITCH
 from optical_paths import aperture, path, sensor
 
 from vcam_cli import simulate
-from vcam_cli.camera.derived.mosaic import Mosaic
+from vcam_cli.camera.derived.mosaic import BLOCKS, Mosaic
 from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.image_formation.estimates import chart_cells, scene_sampling
 from vcam_cli.image_formation.layers import layered, ray_windows
@@ -440,6 +440,23 @@ def test_layers_beside_the_array_are_not_seen(chart, tmp_path):
         for source in ({"kind": "layers", "layers": [beside, even]}, even["source"])
     ]
     np.testing.assert_allclose(*found, rtol=1e-5)
+
+
+def test_bounds_of_a_honeycomb_are_those_of_its_pixels(tmp_path, monkeypatch):
+    """Half of the places of its lattice have no pixel: as zeros they would halve mean squares."""
+    bounds = []
+
+    def kept(bound, allowed):
+        bounds.append(bound)
+        return windows_with(bound, allowed)
+
+    monkeypatch.setattr(layered, "windows_with", kept)
+    pattern = {"array.pattern": "honeycomb", "output.render": "none"}
+    light(tmp_path, {"array.rows": 24, "array.columns": 24} | pattern)
+    (bound,) = bounds
+    has_pixel = Mosaic(BLOCKS["honeycomb"]).color_at(*map(np.arange, bound.shape)) >= 0
+    over_pixels, over_all = (np.square(b).mean() for b in (bound[has_pixel], bound))
+    assert 0 < over_pixels <= 1.1 * over_all
 
 
 @pytest.mark.parametrize("f_number", long_except([1000], [1000, 3000]))

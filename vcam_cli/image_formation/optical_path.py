@@ -93,7 +93,7 @@ class OpticalPath:
     device: Processor = PROCESSOR
     """Where sampled scenes are transformed, filtered and evaluated at the pixels."""
     is_mosaic: bool = False
-    """Whether each pixel needs its own color alone: layers are then composed in that color."""
+    """Whether each place needs its pixel's color alone: layers are then composed in that color."""
     is_explained: bool = True
     """Whether the report says what each transfer function changes: 3 % of a frame of 64 x 64
     pixels of a data set, which needs no plan."""

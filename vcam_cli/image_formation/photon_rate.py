@@ -121,7 +121,8 @@ def photo_rate(path: OpticalPath, scene: AnyScene, planes: bool = False) -> Rate
         Where memory does not suffice.
     """
     plan = light_plan(path, scene)
-    path = replace(plan.reduced(path), is_mosaic=not planes)
+    # Bounds are rms over all places: those without a pixel would have none, and halve the squares.
+    path = replace(plan.reduced(path), is_mosaic=not planes and path.mosaic.is_full)
     assumed, times = path.full, 0
     while True:
         times += 1

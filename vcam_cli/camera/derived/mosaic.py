@@ -40,6 +40,11 @@ class Mosaic:
         """Colors in the order of channels: R, G, B first, others by first appearance."""
         return channel_order(c for row in self.block for c in row if c != NONE)
 
+    @cached_property
+    def is_full(self) -> bool:
+        """Whether there is a pixel at every place."""
+        return all(name != NONE for row in self.block for name in row)
+
     def row_colors(self, row: int, first: int = 0) -> Iterator[tuple[int, list[slice]]]:
         """Yield every color of an array row: its index, and its columns, from the first one on."""
         line = self.block[row % len(self.block)]
