@@ -149,6 +149,7 @@ class KeptNormals:
         )
         start = self._next_row
         self._next_row += rows
+        assert self._next_row <= self._key[-1], "each number of a sensor is drawn once"
         return drawn[start : self._next_row].copy()
 
     def random(self, size: tuple[int, int]) -> Array:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import glob
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, partial
 from pathlib import Path
 
 from vcam_cli.camera import load as cameras
@@ -60,10 +60,18 @@ class DatasetFile:
         """The camera before anything is drawn."""
         return self.base.validate(CHECKS)
 
+    def frame(self, number: int) -> Frame:
+        """Return a frame, by its number from 0."""
+        drawn = self._drawn
+        if number not in drawn:
+            if len(drawn) >= KEPT_FRAMES:
+                drawn.clear()
+            drawn[number] = draw_frame(self.model, self.scenes, number)
+        return drawn[number]
+
     @cached_property
-    def frame(self) -> Callable[[int], Frame]:
-        """Returns a frame, by its number from 0."""
-        return lru_cache(KEPT_FRAMES)(partial(draw_frame, self.model, self.scenes))
+    def _drawn(self) -> dict[int, Frame]:
+        return {}
 
     def cameras(self) -> Iterator[Camera]:
         """Yield cameras with each end of what is drawn. Raises BadInput with all mistakes."""
