@@ -446,9 +446,9 @@ def test_bounds_of_a_honeycomb_are_those_of_its_pixels(tmp_path, monkeypatch):
     """Half of the places of its lattice have no pixel: as zeros they would halve mean squares."""
     bounds = []
 
-    def kept(bound, allowed):
+    def kept(bound, *rest):
         bounds.append(bound)
-        return windows_with(bound, allowed)
+        return windows_with(bound, *rest)
 
     monkeypatch.setattr(layered, "windows_with", kept)
     pattern = {"array.pattern": "honeycomb", "output.render": "none"}
