@@ -94,11 +94,10 @@ SHRINK = 0.25
 """Square of the error of a level over that of the one before, about."""
 GROWTH = 4
 """Values that a level takes over those of all before it, about."""
-LEFT_OUT = 0.6
-"""Part of what is allowed that windows left out may have, by their bound. Rays of eight layers look
-up a quarter less at `standard` than with 0.3 (rectangles; leaves a seventh, photographs a
-twentieth), at 0.2 % a fifth less (rectangles), as much (photographs), and half as much again
-(leaves), in no more time; with 0.7 leaves take twice the time there."""
+LEFT_OUT = 0.3
+"""Part of what is allowed that windows left out may have, by their bound. With 0.6 rays of eight
+layers look up a quarter less at `standard` (rectangles), in as much time, and eight of leaves take
+2.4 times the time at 0.2 %."""
 BEYOND = 0.4
 """Part of what is allowed that light which diffracts from beyond a window's border may have."""
 WIDEST_BORDER = 12
