@@ -121,6 +121,11 @@ class OpticalPath:
         )
 
     @property
+    def planes(self) -> int:
+        """Planes of layers: 1 where each place needs its own color alone, else one per color."""
+        return 1 if self.is_mosaic else len(self.mosaic.colors)
+
+    @property
     def scatter(self) -> float:
         """Factor by which a mean square over the pixels may lie above that of all places.
 

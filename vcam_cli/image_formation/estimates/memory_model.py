@@ -353,8 +353,7 @@ def composed_bytes(path: OpticalPath, layers: int, rays: int) -> int:
     """
     pixels = path.geometry.rows * path.geometry.columns
     width = path.settings.float_width // 8
-    colors = 1 if path.is_mosaic else len(path.mosaic.colors)
-    held = layers + (2 * colors + 3) * pixels * width
+    held = layers + (2 * path.planes + 3) * pixels * width
     work = max(round(SLACK * rays), work_bytes(pixels, path.workers))
     return BASE + round(SLACK * held) + work
 

@@ -29,11 +29,6 @@ class Pixels:
         """Position (x, y) of the window's center [m]."""
         return self.window.center(self.path.geometry)
 
-    @property
-    def planes(self) -> int:
-        """Planes of an image: 1 where each pixel needs its own color alone, else one per color."""
-        return 1 if self.path.is_mosaic else len(self.path.mosaic.colors)
-
     def gathered(self, layers: Layers, kinds: int = 1) -> Array:
         """Return the sum of parts of an image.
 
@@ -51,7 +46,7 @@ class Pixels:
         """
         shape, dtype = self.window.pixels, self.path.settings.dtype
         mosaic, first = self.path.mosaic, (self.window.rows.start, self.window.columns.start)
-        out: Array = np.zeros((kinds, self.planes, *shape), dtype)
+        out: Array = np.zeros((kinds, self.path.planes, *shape), dtype)
         columns, rows = pixel_centers(self.window.geometry(self.path.geometry))
         x, y = columns + self.center[0], rows + self.center[1]
         for number, layer in enumerate(layers):
@@ -64,7 +59,7 @@ class Pixels:
 
     def own(self, image: Array) -> Array:
         """Return an image (C, rows, columns) of every color as it is composed: (planes, ...)."""
-        if len(image) == self.planes:
+        if len(image) == self.path.planes:
             return image
         out: Array = np.zeros_like(image[:1])
         first = self.window.rows.start, self.window.columns.start

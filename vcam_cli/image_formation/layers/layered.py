@@ -212,8 +212,7 @@ def _composed(
     everywhere [e/s].
     """
     g, white = path.geometry, float(path.transfer.level[-1].max())
-    planes = Pixels(path, Window(slice(0, g.rows), slice(0, g.columns))).planes
-    total: Array = np.zeros((planes, g.rows, g.columns), path.settings.dtype)
+    total: Array = np.zeros((path.planes, g.rows, g.columns), path.settings.dtype)
     clear, bound, widest = np.ones_like(total[0]), np.zeros_like(total[0]), np.zeros_like(total[0])
     far = WIDEST_BORDER * max(g.pitch_x, g.pitch_y)
     spread = spread_behind(g, scene.parts, path.layers, path.transfer.level, far, SIDE)
