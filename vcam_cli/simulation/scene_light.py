@@ -261,9 +261,11 @@ def _with_full_signal(full: float, seen: SceneLight, light: photon_rate.Rate) ->
     `full` is that of pixels that are read as one [e/s].
     """
     path = seen.path
+    if seen.solved.layout.binning_groups.count == 1:  # `photo_rate` has judged by the same
+        return seen
     alone = min(float(light.values.max(initial=0.0)), path.ceiling)
     known = full * (1 + path.settings.tolerance)  # no better than by what light may err
-    if full == 0 or known >= min(alone, path.full):  # `photo_rate` has judged by these
+    if full == 0 or known >= min(alone, path.full):  # and by these
         return seen
     omitted = replace(path, omitted_share=light.plan.share * alone / full)
     if light.spectrum.lost_rms < omitted.usable_error * full:
