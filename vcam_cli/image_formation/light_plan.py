@@ -203,9 +203,8 @@ def _blur_shares(cost: LightCost, budget: float) -> dict[Effect, float]:
         return dict.fromkeys(losses, math.inf)
     flat = scene.flat if isinstance(scene, LayeredScene | DepthScene) else scene
     given = list(losses.values())
-    if has_straight_edges(
-        flat
-    ):  # a blur over the field as if it were everywhere as where it is most: see below
+    if has_straight_edges(flat):
+        # A blur over the field as if it were everywhere as where it is most: see below.
         given = [replace(loss, is_uniform=True) for loss in given]
     bounds = flat.change_bounds(given, path.geometry, path.ceiling, budget)
     # Pixels that are read as one have less than the brightest of them.

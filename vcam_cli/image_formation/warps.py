@@ -207,7 +207,7 @@ def warped_layers(path: OpticalPath, scene: AnyScene) -> tuple[Layers, SpectrumR
     reports = [report for _, report in found]
     if not seen.is_magnified:
         reports = [_with_warped_cells(own) for own in reports]
-    return chain(*(layers for layers, _ in found)), _joined(rest, reports)
+    return chain(*(layers for layers, _ in found)), _joined_report(rest, reports)
 
 
 def _with_warped_cells(report: SpectrumReport) -> SpectrumReport:
@@ -314,7 +314,7 @@ def _share_of(path: OpticalPath, share: Array) -> OpticalPath:
     return replace(path, transfer=own, full=path.full * part)
 
 
-def _joined(path: OpticalPath, reports: Sequence[SpectrumReport]) -> SpectrumReport:
+def _joined_report(path: OpticalPath, reports: Sequence[SpectrumReport]) -> SpectrumReport:
     """Return the joint report on parts of the light."""
     first, *others = reports
     if not others:

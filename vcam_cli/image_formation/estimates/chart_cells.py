@@ -252,7 +252,9 @@ class CellError:
         turns = np.minimum(f * side, 0.5)
         # of k: the contrast turns / (turns + k), squared, times the energy (d / 2 pi (turns + k))^2
         parts = (1 / np.square(np.square(turns + np.array(FOLDS)[:, None]))).sum(axis=0)
-        folded = np.where(turns < 0.5, np.square(turns * side / (2 * np.pi)) * parts, self._beyond)
+        folded = np.where(
+            turns < 0.5, np.square(turns * side / (2 * np.pi)) * parts, self._edge_squares
+        )
         return float((self._weights_across @ folded).max())
 
     def _of_alike(self, side: float) -> float:
@@ -291,7 +293,7 @@ class CellError:
         return weights * self._passed_across
 
     @cached_property
-    def _beyond(self) -> Array:
+    def _edge_squares(self) -> Array:
         """What edges of energy 1 have at the frequencies (n,) [m^2]."""
         return np.asarray(np.square(self._unit_edge))
 

@@ -412,7 +412,7 @@ def _largest_squares(transfer: Callable[[Array], Array], blocks: Blocks) -> Arra
     return np.asarray(np.square([transfer(f) for f in blocks.places]).max(axis=0))
 
 
-def _weighted(sums: Array, x: Blocks, y: Blocks) -> Array:
+def _block_squares(sums: Array, x: Blocks, y: Blocks) -> Array:
     """Return sums over blocks of coefficients as mean squares of blocks of terms."""
     if x.own_weights is None or y.own_weights is None:
         return product(y.weights, product(sums, x.weights.T))
@@ -453,5 +453,5 @@ def power_spectrum(
     sums = spectrum.products(along_y.edges, along_x.edges, workers, every)
     for (r, s), of_pair in zip(every, sums, strict=True):
         twice = 1 if r == s else 2
-        products.append(twice * _weighted(of_pair, along_x, along_y))
+        products.append(twice * _block_squares(of_pair, along_x, along_y))
     return PowerSpectrum(along_x, along_y, np.array(products), every, tuple(separable))

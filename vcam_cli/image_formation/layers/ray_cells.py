@@ -389,9 +389,9 @@ class SharpImage:
     def _shares(self, cells: Cells, axis: int) -> Array:
         """Return what part of a pixel's light each of its cells (n,) collects along an axis."""
         key = "collected", cells.per_pixel, axis
-        return self._known.get(key, lambda: self._made_shares(cells, axis))
+        return self._known.get(key, lambda: self._new_shares(cells, axis))
 
-    def _made_shares(self, cells: Cells, axis: int) -> Array:
+    def _new_shares(self, cells: Cells, axis: int) -> Array:
         n = cells.per_pixel
         half = sum(box[-1 - axis] for box in self._apertures) / cells.sides[-1 - axis] / 2
         low, high = (min(max(n / 2 + end, 0.0), n) for end in (-half, half))
@@ -405,9 +405,9 @@ class SharpImage:
 
         From cells to pixels along y: their first one's mean lies where the first cell of all does.
         """
-        return self._known.get((cells.per_pixel, cells.inner), lambda: self._made_on(cells))
+        return self._known.get((cells.per_pixel, cells.inner), lambda: self._new_transfer(cells))
 
-    def _made_on(self, cells: Cells) -> Array:
+    def _new_transfer(self, cells: Cells) -> Array:
         blur, n = self._transfer, cells.per_pixel
         fx, fy = self._frequencies(cells)
         found: Array = np.ones((1, len(fy), len(fx)))

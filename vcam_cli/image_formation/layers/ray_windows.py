@@ -364,7 +364,7 @@ def windows_with(bound: Array, allowed: float, border: int = BORDER) -> tuple[li
     kept = np.ones(squares.shape, bool)
     kept.ravel()[out] = False
     windows = []
-    for top, left, bottom, right in _joined(list(_rectangles(kept)), kept.shape, border):
+    for top, left, bottom, right in _joined_boxes(list(_rectangles(kept)), kept.shape, border):
         squares[top:bottom, left:right] = 0
         down = slice(top * SIDE, min(bottom * SIDE, rows))
         windows.append(Window(down, slice(left * SIDE, min(right * SIDE, columns))))
@@ -389,7 +389,7 @@ def _rectangles(kept: Array) -> Iterator[Box]:
         yield top, left, bottom, right
 
 
-def _joined(rectangles: Sequence[Box], shape: tuple[int, ...], border: int) -> list[Box]:
+def _joined_boxes(rectangles: Sequence[Box], shape: tuple[int, ...], border: int) -> list[Box]:
     """Return rectangles, two of them as the one around both where that costs less.
 
     It may have tiles that lie between them, but none of others. Rays of eight layers of rectangles
