@@ -27,6 +27,10 @@ LONGEST = 128
 """Rows of a spectrum that are filtered together."""
 NODES = 4
 """Frequencies at which a stretch of rows has its transfer function computed."""
+_AT = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
+"""Chebyshev's nodes between -1 and 1."""
+_FROM_POWERS = np.linalg.inv(np.vander(_AT, NODES, increasing=True))
+"""From the powers of a place to the weights of the polynomial through values at the nodes."""
 GROWTH = 1.5
 """Highest over lowest frequency of a stretch: an OTF has a cusp at 0. The cubic through Chebyshev
 nodes then errs by 1e-5 of what the OTF has lost up to there."""
@@ -294,7 +298,8 @@ class Filter:
         """
         device = self._device
         factor = self._weights_x
-        below = weights * self.y.coefficient_index(terms)[1] * self.y.weights[terms]
+        coefficients, signs = self.y.coefficient_index(terms)
+        below = weights * signs * self.y.weights[terms]
         below = below * self.along_y[terms]
         for stretch in self._stretches(terms):
             fy = self.y.frequencies[terms[stretch]]
@@ -308,7 +313,7 @@ class Filter:
             values = device.put(read, dtype)
             longest = LONGEST if device.whole else rows_at_once(count)
             for part in slices_within(stretch, longest):
-                index = _consecutive(self.y.coefficient_index(terms[part])[0])
+                index = _consecutive(coefficients[part])
                 if not isinstance(index, slice):
                     index = device.put(index)
                 at = slice(part.start - stretch.start, part.stop - stretch.start)
@@ -435,13 +440,9 @@ def chebyshev(at: Array) -> tuple[Array, Array]:
         Weights (n, NODES) at the places.
     """
     low, high = float(at.min()), float(at.max())
-    nodes = (low + high) / 2 + (high - low) / 2 * np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
-    weights = np.ones((len(at), NODES))
-    for i in range(NODES):
-        for j in range(NODES):
-            if i != j:
-                weights[:, i] *= (at - nodes[j]) / (nodes[i] - nodes[j])
-    return nodes, weights
+    middle, half = (low + high) / 2, (high - low) / 2
+    powers = np.vander((at - middle) / half, NODES, increasing=True)
+    return middle + half * _AT, powers @ _FROM_POWERS
 
 
 def _consecutive(index: Array) -> Array | slice:

@@ -179,6 +179,16 @@ class Tables:
         found = ((np.flatnonzero(seen[:, a]), slice(int(a), int(b))) for a, b in spans)
         return [(planes, colors) for planes, colors in found if len(planes)]
 
+    @cached_property
+    def steps(self) -> tuple[Array, Array, Array]:
+        """Entries over |f| of the tables that are not 0, steps to the next, and which they are.
+
+        They are (n, entries), (n, entries - 1) and (R C,).
+        """
+        every = self.radial.reshape(-1, self.radial.shape[-1])
+        lit = np.asarray(every.any(axis=1))
+        return every[lit], np.diff(every[lit]), lit
+
     @property
     def is_radial(self) -> bool:
         """Whether all tables are over |f|: such tables are small."""
@@ -320,9 +330,8 @@ class PartReader:
     """Tables of one parity, interpolated."""
 
     tables: Tables
-    radial: tuple[Array, Array, Array] | None
-    """Entries over |f| (n, entries) of the tables that are not 0, the steps to the next, and which
-    they are (R C,); None where this parity has no radial part."""
+    has_radial: bool
+    """Whether this parity has the part over |f|."""
     plane: Array | None
     """Spline coefficients (R, C, m, m) over fy and fx, where there is such a part."""
     spline_x: Any
@@ -337,15 +346,14 @@ class PartReader:
         rows = along_y.toarray()[:, near] @ self.plane[..., near, :]
         flat = rows.reshape(-1, rows.shape[-1])
         total: Array = (self.spline_x[: len(fx)] @ flat.T).T.reshape(*rows.shape[:-1], len(fx))
-        if self.radial is not None:
+        if self.has_radial:
             total += self.radial_values(fx, fy)
         total *= np.hypot(fx, fy[:, None]) <= self.tables.top
         return total
 
     def radial_values(self, fx: Array, fy: Array) -> Array:
         """Return the part over |f| at frequencies (n,) and (m,); its end holds beyond it."""
-        assert self.radial is not None
-        tables, (entries, steps, lit) = self.tables, self.radial
+        tables, (entries, steps, lit) = self.tables, self.tables.steps
         last = steps.shape[-1]
         position = np.add(np.square(fx), np.square(fy)[:, None]).ravel()
         np.sqrt(position, out=position)  # in a quarter of the time of `hypot`
@@ -391,15 +399,11 @@ def reader(tables: Tables, parity: int, fx: Array) -> TableReader:
 
 
 def _part_reader(tables: Tables, parity: int, fx: Array) -> PartReader:
-    plane, radial = tables.planes[parity], None
-    if parity == tables.radial_parity:
-        every = tables.radial.reshape(-1, tables.radial.shape[-1])
-        lit = np.asarray(every.any(axis=1))
-        radial = every[lit], np.diff(every[lit]), lit
+    plane, has_radial = tables.planes[parity], parity == tables.radial_parity
     if plane is None:
-        return PartReader(tables, radial, None, None)
+        return PartReader(tables, has_radial, None, None)
     spline = spline_weights(plane.shape[-1], fx / tables.top)
-    return PartReader(tables, radial, _spline_coefficients(plane), spline)
+    return PartReader(tables, has_radial, _spline_coefficients(plane), spline)
 
 
 def _spline_coefficients(plane: Array) -> Array:

@@ -392,7 +392,7 @@ _RADIAL: ByteCache[Array] = ByteCache(KEPT, strict=True)
 """Values of one lens are the same for all pictures of a size."""
 
 
-@lru_cache(4)
+@lru_cache(16)  # a scene of eight layers has windows of as many sizes
 def _shells(x: Blocks, y: Blocks, pitch: tuple[float, float]) -> tuple[Array, Array, int]:
     """Return frequencies (n,) [pixel Nyquist], each block's zone and shell, the number of zones.
 
