@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.parallel import product
+from vcam_cli.parallel import pieces, product, rows_at_once
 from vcam_cli.scenes.base import SPARSE, Chart, Frame, PaintedCells
 from vcam_cli.scenes.cells import clip_cells
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, counted_height
@@ -27,7 +27,7 @@ class PictureChart(Chart):
     mirrored: bool
     """Whether the picture goes on beyond its frame as its mirror image; else all is 0 there."""
 
-    @property
+    @cached_property
     def brightest(self) -> float:
         """Brightest light, relative to the perfect white."""
         return float(self.picture.max())
@@ -102,13 +102,24 @@ class PictureChart(Chart):
         return {}
 
     def _edges_times_length(self, level: Array, ceiling: float) -> float:
-        light = self.picture @ np.asarray(level, self.picture.dtype)
-        down, across = self.frame.height / len(light), self.frame.width / light.shape[1]
-        if not self.mirrored:
-            light = np.pad(light, 1)
-        steps_x = counted_height(light[:, 1:], light[:, :-1], ceiling).sum(dtype=float)
-        steps_y = counted_height(light[1:], light[:-1], ceiling).sum(dtype=float)
-        return float(steps_x * down + steps_y * across)
+        height, width, _ = self.picture.shape
+        down, across = self.frame.height / height, self.frame.width / width
+        level = np.asarray(level, self.picture.dtype).reshape(self.picture.shape[2], -1)
+        around = 0 if self.mirrored else 1
+        end = np.zeros((around, width, level.shape[1]), level.dtype)
+        above, total = end, 0.0
+        for rows in pieces(height, rows_at_once(level.size * width)):  # in half the time of all
+            light = self.picture[rows] @ level
+            last = end if rows.stop == height else end[:0]
+            lines = np.concatenate([above, light, last])
+            wide = np.pad(light, ((0, 0), (around, around), (0, 0)))
+            for steps, length in (
+                (counted_height(wide[:, 1:], wide[:, :-1], ceiling), down),
+                (counted_height(lines[1:], lines[:-1], ceiling), across),
+            ):
+                total += length * float(steps.sum(dtype=float))
+            above = light[-1:]
+        return total
 
     def channel(self, number: int) -> "PictureChart":
         """Return one of its channels alone.
@@ -191,7 +202,7 @@ class CubeChart(PictureChart):
     units: Array
     """Value of band k at which component k is 1 (bands,)."""
 
-    @property
+    @cached_property
     def brightest(self) -> float:
         """Brightest light of a band over that of white there."""
         return float((self.picture.reshape(-1, len(self.units)).max(axis=0) / self.units).max())
