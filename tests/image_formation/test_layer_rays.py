@@ -167,7 +167,7 @@ def test_waves_diffract_from_rays_between_pairs_of_points(period, angle, rings, 
     g = sensor(16, 16)
     layer = LayerOptics((lens,), radius)
     sharp = SharpImage(replace(path(g, lens, aperture(g)), layers=(layer,)))
-    cells = Cells(g, Window(slice(0, 16), slice(0, 16)), per_pixel, 0, (0, 0), single=False)
+    cells = Cells(g, Window(slice(0, 16), slice(0, 16)), per_pixel, (0, 0), (0, 0), single=False)
     cell = PIXEL_PITCH / per_pixel
     at = (np.arange(64) + 0.5) / period
     x, y = (at[None, :], 0) if angle == 0 else (0, at[:, None])
@@ -212,7 +212,7 @@ def test_pixels_of_a_window_take_their_own_color():
 def test_rays_meet_the_cells_that_they_lie_in(divided, offset):
     """Cells divide photodetectors, or whole pixels: also where gaps lie between them."""
     g, count = sensor(16, 16), 3
-    cells = Cells(g, Window(slice(2, 7), slice(5, 9)), count, 0, (10, 10), divided=divided)
+    cells = Cells(g, Window(slice(2, 7), slice(5, 9)), count, (0, 0), (10, 10), divided=divided)
     (indices,) = cells.met(np.array([offset]))
     for axis, (pixels, index) in enumerate(zip(((5, 9), (2, 7)), indices[::-1], strict=True)):
         edges, side = cells.edges()[axis], cells.sides[axis]

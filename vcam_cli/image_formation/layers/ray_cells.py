@@ -95,8 +95,8 @@ class Cells:
     window: Window
     per_pixel: int
     """Along either side of a pixel's part that rays come from."""
-    border: int
-    """Cells around the window that sharp lens and silicon blur into it."""
+    border: tuple[int, int]
+    """Rows and columns of cells around the window that sharp lens and silicon blur into it."""
     reach: tuple[int, int]
     """Rows and columns of pixels around those, on which rays meet layers."""
     single: bool = True
@@ -113,8 +113,8 @@ class Cells:
     @cached_property
     def inner(self) -> tuple[int, int]:
         """Rows and columns of cells of the window and its border."""
-        rows, columns = (n * self.per_pixel + 2 * self.border for n in self.window.pixels)
-        return rows, columns
+        (rows, columns), (down, right) = self.window.pixels, self.border
+        return rows * self.per_pixel + 2 * down, columns * self.per_pixel + 2 * right
 
     @property
     def middle(self) -> float:
@@ -136,16 +136,18 @@ class Cells:
         Cells
             Cells of the same window.
         """
-        return replace(self, per_pixel=self.per_pixel // count, border=self.border // count)
+        border = self.border[0] // count, self.border[1] // count
+        return replace(self, per_pixel=self.per_pixel // count, border=border)
 
     def edges(self) -> tuple[Array, Array]:
         """Return the edges of columns and of rows of all cells [m]."""
-        g, around = self.geometry, self.border // self.per_pixel
+        g = self.geometry
         x, y = pixel_centers(g, detector=True)
         centers, pitches = (x[self.window.columns], y[self.window.rows]), (g.pitch_x, g.pitch_y)
         found = []
         for axis, (center, pitch) in enumerate(zip(centers, pitches, strict=True)):
-            beyond, side = around + self.reach[1 - axis], self.sides[axis]
+            beyond = self.border[1 - axis] // self.per_pixel + self.reach[1 - axis]
+            side = self.sides[axis]
             first = center[0] - pitch * self.divided[axis] / 2
             pixels = first + pitch * np.arange(-beyond, len(center) + beyond)
             gap = np.linspace(self.divided[axis] * pitch, pitch, self._in_gap(axis) + 1)[:-1]
@@ -375,9 +377,10 @@ class SharpImage:
 
     def _collected(self, cells: Cells, image: Array, axes: Iterable[int]) -> Array:
         """Return the means over the collecting areas of an image, exactly on its even cells."""
-        n, start = cells.per_pixel, cells.border
+        n = cells.per_pixel
         for axis in axes:
             pixels, shares = cells.window.pixels[axis], self._shares(cells, axis)
+            start = cells.border[axis]
             total: Array | float = 0.0
             for k in np.flatnonzero(shares):
                 part = slice(start + int(k), start + int(k) + n * pixels, n)
@@ -405,37 +408,42 @@ class SharpImage:
 
         From cells to pixels along y: their first one's mean lies where the first cell of all does.
         """
-        return self._known.get((cells.per_pixel, cells.inner), lambda: self._new_transfer(cells))
+        key = cells.per_pixel, cells.border, cells.inner
+        return self._known.get(key, lambda: self._new_transfer(cells))
 
     def _new_transfer(self, cells: Cells) -> Array:
         blur, n = self._transfer, cells.per_pixel
         fx, fy = self._frequencies(cells)
-        found: Array = np.ones((1, len(fy), len(fx)))
+        real, whole = (np.float32, np.complex64) if cells.single else (np.float64, np.complex128)
+        found: Array = np.ones((1, len(fy), len(fx)), real)
         if blur.effects:
             level = blur.level[0][:, None, None]
-            found = self._blur(cells, fx, fy) / np.where(level > 0, level, 1.0)
+            found = self._blur(cells, fx, fy, real)
+            found /= np.where(level > 0, level, 1.0).astype(real)
         for effect in self._separable:
-            found = found * np.outer(effect.along_y(fy), effect.along_x(fx))
-        waves = np.outer(scipy.fft.fftfreq(len(fy)), cells.border + np.arange(n))
+            found *= np.outer(effect.along_y(fy), effect.along_x(fx)).astype(real)
+        waves = np.outer(scipy.fft.fftfreq(len(fy)), cells.border[0] + np.arange(n))
         collected = np.exp(2j * np.pi * waves) @ self._shares(cells, -2) / n
-        found = found * collected[:, None]
-        return found.astype(np.complex64 if cells.single else np.complex128)
+        return np.asarray(found * collected[:, None].astype(whole))
 
     def _frequencies(self, cells: Cells) -> tuple[Array, Array]:
         """Return the frequencies along x and y of transforms of images [cycles/m]."""
         (side_x, side_y), shape = cells.sides, cells.inner
         return scipy.fft.rfftfreq(shape[1]) / side_x, scipy.fft.fftfreq(shape[0]) / side_y
 
-    def _blur(self, cells: Cells, fx: Array, fy: Array) -> Array:
+    def _blur(self, cells: Cells, fx: Array, fy: Array, kind: type) -> Array:
         """Return the response (C, m, n) of lens and silicon at pairs of frequencies [e/s]."""
         if self._transfer.plane_blurs:
             response: Array = self._transfer.plane_response(fx, fy)[0]
-            return response
+            return response.astype(kind)
         lengths, known = self._radial(cells.sides)
         half = len(fy) // 2 + 1  # the other half has the same lengths, in reverse
-        length = np.hypot(fx, fy[:half, None])
-        found = np.stack([np.interp(length, lengths, one) for one in known])
-        return np.concatenate([found, found[:, len(fy) - half : 0 : -1]], axis=1)
+        found: Array = np.empty((len(known), len(fy), len(fx)), kind)
+        length = np.sqrt(np.add(np.square(fx), np.square(fy[:half, None])))
+        for plane, one in zip(found, known, strict=True):
+            plane[:half] = np.interp(length, lengths, one)
+            plane[half:] = plane[len(fy) - half : 0 : -1]
+        return found
 
     def _radial(self, sides: tuple[float, float]) -> tuple[Array, Array]:
         """Return frequencies (n,), up to the highest on cells [cycles/m], and the response there.

@@ -26,10 +26,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
+from itertools import count
 from typing import NamedTuple
 
 import numpy as np
+from scipy.fft import next_fast_len
 
 from vcam_cli.arrays import Array
 from vcam_cli.effects.base import of_kind
@@ -249,7 +251,13 @@ class RaySum:
 
     def _cells(self, window: Window, level: int) -> Cells:
         per_pixel, g = self.levels[level].cells, self.path.geometry
-        border = 0 if self.sharp.is_local else self.border * per_pixel
+        rows, columns = window.pixels
+        border = (0, 0)
+        if not self.sharp.is_local:
+            border = (
+                per_pixel * _fast_border(rows, self.border),
+                per_pixel * _fast_border(columns, self.border),
+            )
         down, right = (
             math.ceil(far / pitch) + 1
             for far, pitch in zip(self.furthest[::-1], (g.pitch_y, g.pitch_x), strict=True)
@@ -332,6 +340,15 @@ def border_around(
     errors = 2 * math.sqrt(2) * hidden * (tail[:-1] - tail[-1])
     number = min(int((errors > BEYOND * allowed).sum()), len(pixels) - 1)
     return int(pixels[number]), float(errors[number])
+
+
+@lru_cache(1 << 10)
+def _fast_border(pixels: int, least: int) -> int:
+    """Return the narrowest border with which transforms are fast.
+
+    Eight layers of photographs take a twentieth less time so.
+    """
+    return next(n for n in count(least) if next_fast_len(pixels + 2 * n) == pixels + 2 * n)
 
 
 def windows_with(bound: Array, allowed: float, border: int = BORDER) -> tuple[list[Window], float]:
