@@ -116,6 +116,7 @@ class FieldBlur(AberrationBlur, FieldTransfer):
             )
         )
 
+    @remembered(4)  # a plan prices an image through it a dozen times
     def rings(self, count: int) -> tuple[Zone, ...]:
         """Return `count` places from center to corner, or more, whose weights sum to 1.
 

@@ -274,7 +274,7 @@ class UniformBlur(AberrationBlur):
         found = self.lens.describe(self.terms)
         return found if self.focus is None else f"{found}; {describe_focus(self.focus)}"
 
-    @property
+    @cached_property
     def reach(self) -> float:
         """How far from its place the blur throws almost all of the light, diffraction aside [m]."""
         return max(self.lens.reach(blur.terms) for blur in self.extremes)

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -268,6 +269,7 @@ def fast_margin_around(sizes: Sequence[int], least: int) -> int:
     return min(range(least, least + 33), key=lambda margin: (cost(margin), margin))
 
 
+@lru_cache(1 << 10)
 def _work(size: int) -> int:
     """Return the sum of the prime factors of a transform's size: what it costs per sample."""
     total, factor = 0, 2
