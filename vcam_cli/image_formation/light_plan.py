@@ -30,7 +30,7 @@ from vcam_cli.effects.pixel_signal import (
 )
 from vcam_cli.effects.warps import StillWarp, Warp
 from vcam_cli.image_formation.estimates.edge_changes import exact_changes, has_straight_edges
-from vcam_cli.image_formation.estimates.light_cost import LightCost
+from vcam_cli.image_formation.estimates.light_cost import FIRST, LightCost
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.scenes.base import ChartScene
 from vcam_cli.scenes.blur_change import BlurLoss
@@ -111,7 +111,8 @@ class LightPlan:
             The plan.
         """
         more = max((2 if darkness < DARKER else 1) - times, 0)
-        saved = times * self.saved_together + more * self.of_all
+        again = (times - 1) * self.saved_together + more * self.of_all
+        saved = self.saved_together + FIRST * again
         return replace(self, saved_together=saved)
 
     def reduced(self, path: OpticalPath) -> OpticalPath:

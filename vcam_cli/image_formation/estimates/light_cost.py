@@ -104,15 +104,19 @@ edges need fewer modes."""
 FIELD = 0.035
 """Finding the modes of a blur over the field up to the Nyquist frequency of the pixels, and by its
 square up to another [s]."""
-SHEARED = 1.6
+SHEARED = 1.4
 """Cost of pixels whose rows see the scene at other places over that of others."""
 ENTRIES_OF_PLANE = 150
 """Entries along an axis of a table over fx and fy, about."""
 WARPED_CELLS, COLOR_GROUPS = 6, 4
 """Cells of a warped chart per pixel, and wavelengths at which a warp by color is followed, as often
 as not."""
-BEYOND = 1.15
-"""Where the spectrum of a chart ends over where that of edges anywhere would, as often as not."""
+BEYOND, BEYOND_PARALLEL = 1.15, 1.03
+"""Where the spectrum of a chart ends over where that of edges anywhere would, as often as not, and
+that of parallel edges."""
+FIRST = 0.65
+"""Cost of light that is formed once more, being darker than assumed, over that of its last image:
+the brighter light may err by more, which takes fewer terms and modes (0.62 to 0.73)."""
 HIGHEST = 2.0
 """Highest frequency of a picture that is filtered, as often as not [pixel Nyquist]."""
 WAVES = WaveScene | HarmonicScene
@@ -203,7 +207,7 @@ def image_seconds(geometry: Geometry, colors: int, report: SpectrumReport) -> fl
             for cells, planes, own in report.parts
         )
     )
-    return report.times * once
+    return once * (1 + FIRST * (report.times - 1))
 
 
 def _flat_seconds(geometry: Geometry, colors: int, report: SpectrumReport) -> float:
@@ -333,7 +337,8 @@ def expected_report(
     if profile and not path.field:
         return SpectrumReport(edges=len(profile.places))
     planes = min(PLANES, len(path.transfer.weights))
-    found = _sampled(path, scene, planes, with_memory)
+    beyond = BEYOND_PARALLEL if profile else BEYOND
+    found = _sampled(path, scene, planes, beyond, with_memory)
     directed = bool(path.transfer.plane_blurs)
     modes = MODES_OF_EDGES if profile else MODES
     filters = modes if path.field else PARITIES if directed else 1
@@ -364,7 +369,7 @@ def _averaged(path: OpticalPath, scene: SampledScene) -> SpectrumReport:
 
 
 def _sampled(
-    path: OpticalPath, scene: SampledScene, planes: int, with_memory: bool
+    path: OpticalPath, scene: SampledScene, planes: int, beyond: float, with_memory: bool
 ) -> SpectrumReport:
     """Return the cells of a scene, the predicted terms of its spectrum and their memory."""
     g = path.geometry
@@ -383,7 +388,7 @@ def _sampled(
     # its cells are 2 % coarser; tables of its contrast would take longer than all of the plan.
     sharp = path.with_effects([e for e in path.effects if e is not path.field])
     of_cells = CellError.of_chart(sharp, near, highest)
-    end = BEYOND * 2 * max(g.pitch_x, g.pitch_y) * of_cells.end(error / SURE)
+    end = beyond * 2 * max(g.pitch_x, g.pitch_y) * of_cells.end(error / SURE)
     if scene.is_painted:
         highest = cells_per_pixel(sharp, near, highest, of_cells).per_pixel
         near = near.with_cells(cell_grid(near, g, highest))
