@@ -29,6 +29,7 @@ from vcam_cli.scenes.cells import window_extremes
 LARGE = {"array.rows": 150, "array.columns": 190}
 """So that there are some windows."""
 RAYS_ALONE = QUIET | {"diffraction": "off"}
+_COMPOSED = layered._composed
 
 
 def light(folder, more=LARGE, seed=11) -> np.ndarray:
@@ -371,6 +372,44 @@ def test_what_even_light_behind_hides_is_within_its_bound(effects, tails, tmp_pa
     assert depth.ray_values < 0.7 * whole.ray_values
     apart = np.sqrt(np.mean(np.square(some - most))) / most.max()
     assert apart <= depth.left_out + whole.left_out + tails
+
+
+def test_what_is_hidden_beyond_the_product_of_means_is_within_its_bound(tmp_path, monkeypatch):
+    """A card behind the blurred edge of another one: each ray that passes one meets the other."""
+    seen = []
+
+    def composed(*arguments):
+        light, bound, widest = _COMPOSED(*arguments)
+        seen.append((light, light.copy(), bound))
+        return light, bound, widest
+
+    def whole(bound, *_):
+        return [Window(*(slice(0, count) for count in bound.shape))], 0.0
+
+    monkeypatch.setattr(layered, "_composed", composed)
+    monkeypatch.setattr(layered, "windows_with", whole)
+    layers = []
+    for number, (value, distance) in enumerate(((0.05, 0.5), (1.0, 0.7), (0.05, 2.0))):
+        card = write_exr(tmp_path / f"{number}.exr", np.full((4, 4), value, np.float32))
+        source = {"kind": "image", "file": card}
+        layers.append({"source": source, "distance": f"{distance} m", "width": f"{distance} m"})
+        if number < 2:  # they end on the axis
+            layers[-1]["position"] = [f"{-distance / 2} m", "0 m"]
+    given = {
+        "scene.source": {"kind": "layers", "layers": layers},
+        "scene.radiance": radiance_for(5000),
+        "optics": {"f_number": 2, "focal_length": "5 mm", "focus_distance": "2 m"},
+        "accuracy": "0.5 %",
+        "effects": RAYS_ALONE,
+        "array.rows": 8,
+        "array.columns": 40,
+    }
+    frame = simulate(camera(tmp_path, given)).frame
+    (after, before, bound), *_ = seen
+    hidden, full = np.abs(after - before).max(axis=0), float(after.max())
+    # Rays err by half of the tolerance in the mean over pixels; by four times that in some.
+    assert (hidden <= bound + 4 * frame.spectrum.depth.error * full).all()
+    assert hidden.max() > 0.6 * bound.max() > 0.1 * full
 
 
 def test_opacity_in_closed_form_is_that_of_fine_cells(tmp_path, monkeypatch):
