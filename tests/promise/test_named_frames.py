@@ -15,6 +15,7 @@ import pytest
         ("array", "80268"),  # 2.4 T: rows were read by where their photodetectors are
         ("array", "80184"),  # 1.4 times the variance: levels of pixels, not of joined ones
         ("array", "700303"),  # 1.07 T: light was judged by pixels, not by joined ones
+        ("array", "800010"),  # 1.65 T: a mean filled pixels sooner than white let expect
         ("array", "200509"),  # black: no time is long enough for an automatic exposure
         ("field", "80012"),  # 1.2 T: few places on a stretch of the field
         ("depth", "100034"),  # variance: dark light was 2 % of full signal too high

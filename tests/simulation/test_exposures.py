@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from image_formation.test_rate_cache import BASE, CHANGES, changed
+from layered_reference import write_exr
 from making import camera
 
 from vcam_cli import simulate
@@ -56,6 +57,22 @@ def test_light_is_formed_once_for_the_camera_that_fills_first(tmp_path):
     error = np.subtract(found[0].mean_electrons, short.mean_electrons, dtype=float)
     tolerance = short.frame.settings.tolerance * short.mean_electrons.max()
     assert np.sqrt(np.mean(error**2)) <= tolerance
+
+
+def test_pixels_that_an_automatic_time_fills_get_light_as_exact_as_alone(tmp_path):
+    """Their mean is low: few are so bright that they fill sooner than the white would."""
+    few = np.full((48, 48), 0.002, np.float32)
+    few[20:23, 20:23] = 1
+    scene = {"kind": "image", "file": write_exr(tmp_path / "few.exr", few)}
+    auto = {"auto": {"method": "mean", "target": 0.3, "max": "10 s"}}
+    changes = {"scene.source": scene, "exposure": auto, "effects": "all"}
+    made = camera(tmp_path, changes | {"array.rows": 16, "array.columns": 16})
+    alone = simulate(made, 1, shared=Shared())
+    [found] = exposures([made], 1, Shared())
+    assert found.dn.tobytes() == alone.dn.tobytes()
+    white = camera(tmp_path, changes | {"exposure": {"auto": {"method": "white"}}})
+    loose = simulate(white, 1, shared=Shared())
+    assert alone.frame.spectrum.oversampling > loose.frame.spectrum.oversampling
 
 
 def test_what_moves_or_focuses_has_light_of_its_own(tmp_path):

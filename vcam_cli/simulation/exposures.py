@@ -18,7 +18,13 @@ from vcam_cli.simulation.preparation import whole_frame
 from vcam_cli.simulation.reading import read_camera
 from vcam_cli.simulation.run import Run
 from vcam_cli.simulation.scene_files import flattened
-from vcam_cli.simulation.scene_light import exposed_as, formed_light, rate_of_full, scene_light
+from vcam_cli.simulation.scene_light import (
+    exposed_as,
+    filled_in,
+    formed_light,
+    rate_of_full,
+    scene_light,
+)
 from vcam_cli.simulation.shared import Shared
 
 
@@ -65,7 +71,12 @@ def exposures(
             continue
         path = replace(seen.path, effects=each.effects.mean_signal)
         own = replace(seen, solved=each, path=path)
-        frame = take_frame(whole_frame(own, light, expose(own, light, False)), workers)
+        lit, exposed = light, expose(own, light, False)
+        better = filled_in(exposed.settings.time, exposed.settings.gain, own, light, picture)
+        if better is not own:
+            own, lit = formed_light(better, picture, run)
+            exposed = expose(own, lit, False)
+        frame = take_frame(whole_frame(own, lit, exposed), workers)
         yield Photograph(frame, run.stages, workers, partial(_processed, frame, workers))
 
 

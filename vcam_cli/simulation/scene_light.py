@@ -273,6 +273,46 @@ def _with_full_signal(full: float, seen: SceneLight, light: photon_rate.Rate) ->
     return replace(seen, path=replace(path, full=full), light_key=f"{seen.light_key} {full}")
 
 
+def filled_in(
+    time: float, gain: float, seen: SceneLight, light: photon_rate.Rate, picture: ScenePicture
+) -> SceneLight:
+    """Return the scene as it is to be formed for the time that an automatic exposure chose.
+
+    Before the light was known, the perfect white told at what rate pixels are full. Where they are
+    full at a lower one, the light may err by less.
+
+    Parameters
+    ----------
+    time : float
+        Time that was chosen [s].
+    gain : float
+        Gain that was chosen, without unit.
+    seen : SceneLight
+        The scene before its camera.
+    light : Rate
+        Its light on the lattice.
+    picture : ScenePicture
+        What the scene's files hold.
+
+    Returns
+    -------
+    SceneLight
+        The scene; itself where its light is exact enough.
+    """
+    solved = seen.solved
+    if not solved.exposure.is_timed_by_scene:
+        return seen
+    timed = solved.at_gain(gain).with_exposure(solved.exposure.single(time, gain))
+    better = exposed_as(seen, timed, picture)
+    full, judged = (_largest_signal(each, light.values) for each in (better, seen))
+    if full >= judged:
+        return seen
+    omitted = replace(seen.path, omitted_share=light.plan.share * judged / full)
+    if light.spectrum.lost_rms <= omitted.usable_error * full:
+        return seen
+    return replace(better, solved=solved, light_key=f"{seen.light_key} {better.path.ceiling}")
+
+
 def _widened(seen: SceneLight, picture: ScenePicture, full: float) -> SceneLight:
     """Return the scene with the margin that its light needs; itself where it has that.
 
