@@ -1,5 +1,6 @@
 """How many threads a frame is computed in, that they see all of it, and what if few start."""
 
+import platform
 import subprocess
 import sys
 import threading
@@ -136,3 +137,23 @@ def test_a_blas_starts_no_threads_unless_asked(monkeypatch):
     monkeypatch.setattr(memory.os, "environ", found)
     memory.limit_blas_threads()
     assert [found[name] for name in memory.BLAS_VARIABLES] == ["3", "1", "1"]
+
+
+HEAPS = """
+import ctypes, re, sys, threading
+from vcam_cli import memory
+memory.share_heap()
+library, places = ctypes.CDLL(None), []
+library.malloc.restype = ctypes.c_void_p
+threads = [threading.Thread(target=lambda: places.append(library.malloc(50_000))) for _ in "ab"]
+[thread.start() for thread in threads]
+[thread.join() for thread in threads]
+heap = re.search("(.+)-(.+) .*heap", open("/proc/self/maps").read())
+low, high = (int(end, 16) for end in heap.group(1, 2))
+sys.exit(not all(low <= place < high for place in places))
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="a heap for each thread is glibc's")
+def test_threads_share_a_heap():
+    assert subprocess.run([sys.executable, "-c", HEAPS]).returncode == 0

@@ -212,6 +212,7 @@ def _main() -> None:
         _outlive_reader(name)
     _say_warnings()
     memory.limit_blas_threads()
+    memory.share_heap()
     try:
         memory.require_address_space()
     except CannotDo as error:

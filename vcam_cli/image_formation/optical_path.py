@@ -418,8 +418,6 @@ class SpectrumReport:
     """Bound on the signal before blur: a ceiling above it changes nothing [electrons / s]."""
     memory: int = 0
     """Estimated memory [bytes]."""
-    thread_memory: int = 0
-    """What threads keep of it behind the image [bytes]."""
     device: str = "cpu"
     """Where samples were transformed, filtered and evaluated; all else is the processor's."""
     depth: DepthReport | None = None

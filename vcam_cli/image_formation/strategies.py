@@ -283,7 +283,6 @@ def _spectral_layers(
         table_values=sum(plane.size for plane in planes),
         peak=image.peak,
         memory=total,
-        thread_memory=memory_model.thread_bytes(path, scene, filtered, sampled),
         device=path.device.label,
     )
     here = image_filter.on(path.device)

@@ -29,7 +29,7 @@ from threading import Lock
 from typing import Any, Literal
 
 from vcam_cli.errors import CannotDo
-from vcam_cli.memory import BLAS_VARIABLES
+from vcam_cli.memory import BLAS_VARIABLES, share_heap
 from vcam_cli.parallel import ThreadPool, available_workers
 from vcam_cli.simulation.shared import Shared
 from vcam_cli.sweeps.point_work import Task, compute_on_cluster, compute_points
@@ -294,6 +294,7 @@ class WorkerProcess:
 
 def serve(descriptor: int, threads: int) -> None:
     """Compute what comes, as the main function of a process, until the connection closes."""
+    share_heap()
     connection, shared = Connection(descriptor), Shared()
     with suppress(EOFError, OSError):
         while True:

@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from vcam_cli import memory
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import of_kind
@@ -120,48 +122,18 @@ def image_bytes(
     parts = [(width, scene), *((8, part.scene) for part in rings)]
     pixels, most, kept = g.rows * g.columns, 0, 0
     for each, part in parts:  # one after the other, with what the scene's own cells keep
-        samples = each * _samples(path, part, highest, planes)
+        samples, value = each * _samples(path, part, highest, planes), np.dtype(part.dtype).itemsize
         if part is not scene and isinstance(part, ChartScene) and part.is_painted:
             # as it is painted, which the next ring subtracts, and a copy that is transformed
-            samples = (width + each) * planes * math.prod(part.shape)
+            samples = (value + each) * planes * math.prod(part.shape)
         held = samples + each * series * _series(path, part, filtered) + pixels * width
         x, y = axes(path, part, filtered)
         work = path.workers * working_bytes(x, y, planes, colors, each)
-        painting, own = _painting_bytes(path, part, each * planes)
+        painting, own = _painting_bytes(path, part, min(value, each) * planes)
         kept = own if part is scene else kept
         filtering, painted = round(SLACK * held) + work, round(SLACK * (samples + painting))
         most = max(most, round(SLACK * max(own, kept)) + max(filtering, painted - LATER))
     return BASE + most
-
-
-def thread_bytes(path: OpticalPath, scene: SampledScene, highest: float, planes: int) -> int:
-    """Return what several threads keep of their temporary arrays when they have formed an image.
-
-    The allocator of most systems has a heap for each of them: what is freed there is no room for
-    later arrays of the main thread. That adds up over layers, whose light is held.
-
-    Parameters
-    ----------
-    path : OpticalPath
-        Lens, pixels and settings.
-    scene : SampledScene
-        The scene on its grid.
-    highest : float
-        Frequency up to which the spectrum is filtered [pixel Nyquist].
-    planes : int
-        Number of mixtures of the scene's components.
-
-    Returns
-    -------
-    int
-        Bytes; 0 of one thread.
-    """
-    if path.workers == 1:
-        return 0
-    width, (x, y) = path.settings.float_width // 8, axes(path, scene, highest)
-    painting, _ = _painting_bytes(path, scene, width * planes)
-    work = working_bytes(x, y, planes, len(path.mosaic.colors), width)
-    return max(path.workers * work, painting)
 
 
 def device_bytes(path: OpticalPath, scene: SampledScene, highest: float, planes: int) -> int:

@@ -486,12 +486,11 @@ def is_of_lens(effect: Effect) -> bool:
 def _held_bytes(path: OpticalPath, layers: Sequence[SeenLayer], rays: int) -> int:
     """Return the memory of layers while they are formed and composed, with that of rays [bytes]."""
     held, forming = 0, 0
-    threads = max((layer.report.thread_memory for layer in layers), default=0)
     for layer in layers:  # while one is formed, those before it are kept
         cover = layer.cover.nbytes if layer.path.has_opacity else 0  # else the same number all over
         held += layer.light.nbytes + cover
         forming = max(forming, layer.report.memory + held)
-    return max(memory_model.composed_bytes(path, held, rays), forming) + threads
+    return max(memory_model.composed_bytes(path, held, rays), forming)
 
 
 def _report(
