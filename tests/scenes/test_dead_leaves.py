@@ -22,9 +22,14 @@ ONE = np.array([[0.0, 1.0]])
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-@pytest.mark.parametrize(("in_frame", "rows", "columns"), [(904, 512, 1024), (1620, 303, 1728)])
+@pytest.mark.parametrize(
+    ("in_frame", "rows", "columns"), [(904, 512, 1024), (1620, 303, 1728), (590, 600, 800)]
+)
 def test_painting_a_band_takes_what_is_stated(in_frame, rows, columns, seed):
-    """Of temporary arrays and what is kept of leaves; some pictures have fewer leaves."""
+    """Of temporary arrays and what is kept of leaves; some pictures have fewer leaves.
+
+    The last one is painted in parts of its cells.
+    """
     chart = dead_leaves.DeadLeaves(seed, 1.0, 2.5e-3, keep=True)
     x, y = cell_edges(columns, 1 / in_frame), cell_edges(rows, 1 / in_frame)
     out, mix = np.empty((3, rows, columns), np.float32), np.ones((3, 12), np.float32)

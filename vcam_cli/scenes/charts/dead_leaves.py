@@ -45,8 +45,9 @@ FINEST = 1000
 1.47 of what 0.4, 0.6 and 0.8 of the smallest leaf's radius were asked to, undivided."""
 ROWS = round(PERIOD * FINEST)
 """Rows, and columns, of these cells."""
-PERIOD_BYTES = 18
-"""Memory that each of these cells takes for its visible leaves, as measured [bytes]."""
+PERIOD_BYTES = 22
+"""Memory that each of these cells takes for its visible leaves: 16.2 to 21.5 of twelve seeds
+[bytes]."""
 COLUMNS = 1 << 25
 """Bytes of averages over columns that are kept: those of narrow rings, and the last ones."""
 UNDIVIDED = 600
@@ -71,8 +72,6 @@ often as it is looked at [bytes]: above those traced of ten seeds, 20 to 123 a c
 cells a frame. Where a picture has many small leaves they are half as many again as in the mean."""
 SEEN_BYTES = 2, 20, 70
 """What is kept of them of visible leaves [bytes], likewise above the 5 to 41 a cell traced."""
-PART_BYTES = 150
-"""Temporary arrays of each part of cells that are painted in parts: 39 MB of 255 744 of them."""
 MOST_SEEN_BYTES = 35
 """What is kept of a cell that is painted in parts, whose leaves are counted once [bytes]."""
 OUTLINE = 2 * (1 / SMALLEST - 1 / LARGEST) / math.log(LARGEST / SMALLEST)
@@ -354,41 +353,50 @@ class DeadLeaves(Chart):
 
     def painting_bytes(self, cells: PaintedCells) -> int:
         """Return the memory of temporary arrays of a thread, for cells and parts of them."""
-        parts = self._parts_of(cells.pitch)
-        if parts > 1:
-            return min(parts**2 * cells.count, AT_ONCE) * PART_BYTES
-        crossed, divided = self._crossed(cells.pitch)
+        parts, count, sums = self._parts_of(cells.pitch), cells.count, 0
+        if self._reads_a_period(cells):
+            crossed, divided = self._crossed(self.unit / FINEST, 0.0)
+            count, sums = AT_ONCE, 2 * 8 * max(ROWS * cells.shape[1], AT_ONCE)
+        elif parts > 1:  # each errs on its own
+            crossed, divided = self._crossed(cells.pitch / parts, self.cell_error * parts)
+            count = min(parts**2 * count, AT_ONCE)
+        else:
+            crossed, divided = self._crossed(cells.pitch, self.cell_error)
         plain, once, twice = PAINTING_BYTES
         each = plain + once * crossed + twice * (1 + divided) * crossed**2
-        return round(each * cells.count)
+        return max(round(each * count), sums)
 
     def kept_bytes(self, cells: PaintedCells) -> int:
         """Return the memory of leaves that are seen on cells, and on those of one period.
 
         What is in use while averages over columns are computed counts, too: those of this grid, as
-        many of rings before it, what is painted for them, and sums.
+        many of rings before it, and what is painted for them.
         """
         parts, grid = self._parts_of(cells.pitch), cells.in_grid
-        if not reads_a_period(cells.pitch / self.unit, max(cells.extent) / self.unit):
+        if not self._reads_a_period(cells):
             if grid * parts**2 > KEPT_CELLS:
                 return 0
-            crossed, divided = self._crossed(cells.pitch)
+            crossed, divided = self._crossed(cells.pitch, self.cell_error)
             plain, once, twice = SEEN_BYTES
             each = plain + once * crossed + twice * (1 + divided) * crossed**2
             # Those of the cells that are painted at once are counted with temporary arrays.
             more = grid - (cells.count if parts == 1 else 0)
             return round(min(min(each, MOST_SEEN_BYTES) * max(more, 0), discs.KEPT))
         columns = ROWS * cells.shape[1] * cells.values
-        sums = 2 * 8 * max(ROWS * cells.shape[1], AT_ONCE)
-        return PERIOD_BYTES * ROWS**2 + 2 * columns + AT_ONCE * cells.values + sums
+        return PERIOD_BYTES * ROWS**2 + 2 * columns + AT_ONCE * cells.values
 
-    def _crossed(self, pitch: float) -> tuple[float, int]:
+    def _reads_a_period(self, cells: PaintedCells) -> bool:
+        """Return whether cells are read from sums over one period, which is painted instead."""
+        return reads_a_period(cells.pitch / self.unit, max(cells.extent) / self.unit)
+
+    def _crossed(self, pitch: float, error: float) -> tuple[float, int]:
         """Return the share of cells of a size [m] that an outline crosses, and their divisions.
 
-        A line crosses 4 / pi as many cells as it is cells long.
+        A line crosses 4 / pi as many cells as it is cells long. `error` is the rms error that
+        averages over the cells may have, relative to white.
         """
         cell = pitch / self.unit
-        divided = divisions(self.cell_error / max(cell * FINEST, 1.0))
+        divided = divisions(error / max(cell * FINEST, 1.0))
         return min(4 / math.pi * OUTLINE * cell, 1.0), divided
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
