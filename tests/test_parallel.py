@@ -148,7 +148,7 @@ library.malloc.restype = ctypes.c_void_p
 threads = [threading.Thread(target=lambda: places.append(library.malloc(50_000))) for _ in "ab"]
 [thread.start() for thread in threads]
 [thread.join() for thread in threads]
-heap = re.search("(.+)-(.+) .*heap", open("/proc/self/maps").read())
+heap = re.search("([0-9a-f]+)-([0-9a-f]+) .*heap", open("/proc/self/maps").read())
 low, high = (int(end, 16) for end in heap.group(1, 2))
 sys.exit(not all(low <= place < high for place in places))
 """
