@@ -37,9 +37,9 @@ nodes then errs by 1e-5 of what the OTF has lost up to there."""
 FEW = 1 << 14
 """Terms of a piece up to which all colors are filtered in one call: frames of 64 x 64 pixels, whose
 pieces have some hundred terms, take two thirds of the time."""
-STRETCHES = 4
-"""Stretches among rows that are filtered together, about: one for high frequencies, more for low
-ones."""
+STRETCHES = 10, 2
+"""Nodes of all stretches of a piece over those of one, at most: of the piece with the lowest
+frequencies, whose stretches are short, and of others."""
 SHORTEST = 8
 """Rows below which every row has its own transfer function."""
 KEPT = 1 << 16
@@ -394,7 +394,7 @@ class Filter:
         return out if window is None else out[:, window]
 
 
-def working_bytes(x: Axis, y: Axis, planes: int, colors: int, width: int) -> int:
+def working_bytes(x: Axis, y: Axis, planes: int, colors: int, width: int) -> tuple[int, int]:
     """Return the memory of a thread while it filters a piece of a spectrum.
 
     Parameters
@@ -410,16 +410,21 @@ def working_bytes(x: Axis, y: Axis, planes: int, colors: int, width: int) -> int
 
     Returns
     -------
-    int
-        Bytes: transfer functions at the nodes of all rows that fold onto the piece, what is read of
-        the tables for a stretch of them, the rows of all planes, and light of one or all colors.
+    lowest, others : int
+        Bytes for the piece with the lowest frequencies along y, and for another: transfer functions
+        at the nodes of all rows that fold onto the piece, what is read of the tables for a stretch
+        of them, the rows of all planes, and light of one or all colors.
     """
     rows = min(rows_at_once(x.terms), y.terms, LONGEST)
     folds = math.ceil(y.terms / y.folded_terms)
     nodes = planes * colors * min(NODES, y.terms) * x.terms
     light = colors if rows * x.terms <= FEW else 1
     of_rows = (planes + 3 * light) * rows * x.terms
-    return width * (folds * STRETCHES * nodes + of_rows) + 8 * 3 * nodes
+    lowest, others = (
+        width * ((least + (folds - 1) * STRETCHES[1]) * nodes + of_rows) + 8 * 3 * nodes
+        for least in STRETCHES
+    )
+    return lowest, others
 
 
 def chebyshev(at: Array) -> tuple[Array, Array]:

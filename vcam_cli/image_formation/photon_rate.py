@@ -134,6 +134,7 @@ def photo_rate(path: OpticalPath, scene: AnyScene, planes: bool = False) -> Rate
             plan = plan.formed(times, full / assumed if assumed else 1.0)
             report = replace(_with_place_error(path, found.spectrum), times=times)
             return replace(found, plan=plan, spectrum=report)
+        del found  # not held beside the next one
         path = replace(path, full=full)
 
 

@@ -88,11 +88,17 @@ class StoredSamples:
     dtype = np.dtype(np.float32)
     ndim = 3
 
-    @property
-    def nbytes(self) -> int:
-        """Memory of reading the largest strip, and of its copy in other units [bytes]."""
+    def reading_bytes(self, workers: int = 1) -> int:
+        """Return the memory of threads that read strips, and copies of them in other units [bytes].
+
+        Parameters
+        ----------
+        workers : int, optional
+            Number of threads.
+        """
         rows, columns, bands = self.shape
-        return READER + 2 * int(min(rows, ROWS) * columns * bands * self.dtype.itemsize)
+        strip = min(rows, ROWS) * columns * bands * self.dtype.itemsize
+        return READER + workers * 2 * int(strip)
 
     def __len__(self) -> int:
         return self.shape[0]
@@ -141,8 +147,8 @@ class Cube:
 
     @property
     def nbytes(self) -> int:
-        """Memory that it takes [bytes]: of samples that stay in their file, that of a strip."""
-        return self.data.nbytes
+        """Memory that it takes [bytes]: samples that stay in their file take none."""
+        return 0 if isinstance(self.data, StoredSamples) else self.data.nbytes
 
 
 @dataclass(frozen=True)

@@ -112,8 +112,9 @@ def read_cube(
     with _open_bands(Path(path), yaml_path, names) as (stored, order):
         samples = _place(stored, order)
         data, notes = _si_samples(stored, order, samples)
-        extra = 0
-        if stored.read_rows is None:
+        if isinstance(data, StoredSamples):
+            extra = data.reading_bytes()
+        else:
             extra = round(stored.copies * data.nbytes) + samples.extra_bytes
         return Cube(data, _bands(stored, order), extra), (*stored.notes, *notes)
 

@@ -19,7 +19,7 @@ from vcam_cli.image_formation.estimates import power_spectrum
 from vcam_cli.image_formation.estimates.bandwidth import axes
 from vcam_cli.image_formation.far_field import FarPart
 from vcam_cli.image_formation.field_dependence import ring_entries
-from vcam_cli.image_formation.filtering import working_bytes
+from vcam_cli.image_formation.filtering import LONGEST, working_bytes
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.transfer_tables import (
@@ -31,6 +31,7 @@ from vcam_cli.physics.aberration import GRID_CACHE_BYTES
 from vcam_cli.physics.pupil_harmonics import MOST
 from vcam_cli.scenes.bands import bands_of_rows
 from vcam_cli.scenes.base import ChartScene, PaintedCells, SampledScene
+from vcam_cli.scenes.hyperspectral import CubeScene, StoredSamples
 
 BASE = 147_000_000
 """Interpreter and libraries of `vcam run`: 126 to 138 MB were measured before uniform scenes; few
@@ -126,14 +127,41 @@ def image_bytes(
         if part is not scene and isinstance(part, ChartScene) and part.is_painted:
             # as it is painted, which the next ring subtracts, and a copy that is transformed
             samples = (value + each) * planes * math.prod(part.shape)
-        held = samples + each * series * _series(path, part, filtered) + pixels * width
-        x, y = axes(path, part, filtered)
-        work = path.workers * working_bytes(x, y, planes, colors, each)
+        light = each * series * _series(path, part, filtered)
+        filtering = _filtering_bytes(path, part, filtered, planes, (each, samples, light))
         painting, own = _painting_bytes(path, part, min(value, each) * planes)
         kept = own if part is scene else kept
-        filtering, painted = round(SLACK * held) + work, round(SLACK * (samples + painting))
-        most = max(most, round(SLACK * max(own, kept)) + max(filtering, painted - LATER))
+        image = pixels * width
+        if part is not scene:  # that of its own cells is there
+            filtering += round(SLACK * image)
+        evaluated = round(SLACK * (samples + light + image))
+        painted = round(SLACK * (samples + painting)) - LATER
+        most = max(most, round(SLACK * max(own, kept)) + max(filtering, evaluated, painted))
     return BASE + most
+
+
+def _filtering_bytes(
+    path: OpticalPath,
+    part: SampledScene,
+    highest: float,
+    planes: int,
+    held: tuple[int, int, int],
+) -> int:
+    """Return the memory of filtering up to a frequency [pixel Nyquist], piece by piece.
+
+    `held` are bytes of a number, of samples, and of light once all pieces are filtered. The piece
+    with the lowest frequencies comes first, and takes the most, while there is little light.
+    """
+    width, samples, light = held
+    x, y = axes(path, part, highest)
+    lowest, others = working_bytes(x, y, planes, len(path.mosaic.colors), width)
+    again = path.transfer.plane_blurs or path.field_rings  # once more for every filter
+    first = 1.0 if again else min(1.0, path.workers * LONGEST / y.folded_terms)
+    beside = (path.workers - 1) * others
+    return max(
+        round(SLACK * (samples + first * light)) + lowest + beside,
+        round(SLACK * (samples + light)) + others + beside,
+    )
 
 
 def device_bytes(path: OpticalPath, scene: SampledScene, highest: float, planes: int) -> int:
@@ -249,6 +277,8 @@ def _samples(path: OpticalPath, scene: SampledScene, highest: float, planes: int
 
 def _painting_bytes(path: OpticalPath, scene: SampledScene, values: int) -> tuple[int, int]:
     """Memory of bands of cells while they are painted, with `values` bytes a cell, and then."""
+    if isinstance(scene, CubeScene) and isinstance(scene.picture, StoredSamples):
+        return scene.picture.reading_bytes(path.workers), 0
     if not (isinstance(scene, ChartScene) and scene.is_painted):
         return 0, 0
     rows, columns = scene.shape
