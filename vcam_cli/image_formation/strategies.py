@@ -244,7 +244,7 @@ def _spectral_layers(
     size = table_size(path, image.highest)
     # A layer's image is held beside those of others, counted by the highest frequency.
     filtered = highest if path.has_opacity else image.highest
-    total = needed(filtered) + memory_model.table_bytes(path, len(mixing[0]), size)
+    total = needed(filtered, memory_model.table_bytes(path, len(mixing[0]), size))
     memory_model.require(total, g)
     modes: tuple[Mode, ...] = ()
     if field_rings:

@@ -4,8 +4,9 @@ from collections.abc import Callable
 
 from vcam_cli.parallel import each, pieces
 
-CELLS = 1 << 19
-"""Cells that are painted at once."""
+CELLS = 1 << 18
+"""Cells that are painted at once. With twice as many, two threads that paint leaves took 20 MB
+more, and no frame less processor time."""
 
 
 def bands_of_rows(rows: int, columns: int) -> list[slice]:

@@ -89,8 +89,9 @@ def image_bytes(
     planes: int,
     rings: Sequence[FarPart] = (),
     filtered: float | None = None,
+    tables: tuple[int, int] = (0, 0),
 ) -> int:
-    """Return the memory of an image through the cosine spectrum, tables with a direction aside.
+    """Return the memory of an image through the cosine spectrum.
 
     The scene and the rings around it are computed one after the other. What pixels' series take is
     known once the spectrum is.
@@ -109,6 +110,8 @@ def image_bytes(
         Rings around a near field.
     filtered : float, optional
         Frequency up to which the spectrum is filtered; by default the highest [pixel Nyquist].
+    tables : tuple of int, optional
+        Memory of tables of transfer functions, while the scene is painted and behind that [bytes].
 
     Returns
     -------
@@ -135,8 +138,9 @@ def image_bytes(
         if part is not scene:  # that of its own cells is there
             filtering += round(SLACK * image)
         evaluated = round(SLACK * (samples + light + image))
-        painted = round(SLACK * (samples + painting)) - LATER
-        most = max(most, round(SLACK * max(own, kept)) + max(filtering, evaluated, painted))
+        painted = round(SLACK * (samples + painting)) - LATER + tables[0 if part is scene else 1]
+        formed = max(filtering, evaluated) + tables[1]
+        most = max(most, round(SLACK * max(own, kept)) + max(formed, painted))
     return BASE + most
 
 
@@ -195,8 +199,10 @@ def device_bytes(path: OpticalPath, scene: SampledScene, highest: float, planes:
     return held * (path.settings.float_width // 8)
 
 
-def table_bytes(path: OpticalPath, planes: int, size: TableSize) -> int:
+def table_bytes(path: OpticalPath, planes: int, size: TableSize) -> tuple[int, int]:
     """Return the memory of tables of transfer functions, beside the image.
+
+    Those of a field are made of the harmonics of all its rings once the scene is painted.
 
     How far they reach is known once the scene's spectrum is.
 
@@ -211,8 +217,8 @@ def table_bytes(path: OpticalPath, planes: int, size: TableSize) -> int:
 
     Returns
     -------
-    int
-        Bytes, at least those measured.
+    before, behind : int
+        Bytes while the scene is painted, and behind that, at least those measured.
     """
     colors = len(path.mosaic.colors)
     of_length = _radial_bytes(path, planes, size)
@@ -228,11 +234,12 @@ def table_bytes(path: OpticalPath, planes: int, size: TableSize) -> int:
         of_blurs += INTERPOLATION
     directed = of_kind([ring.blur for ring in path.field_rings], PlaneTransfer)
     if not directed:
-        return of_length + of_blurs
+        return of_length + of_blurs, of_length + of_blurs
     grids = [blur.kept_bytes(light, by_harmonics=True) for blur in directed]
     kept = min(sum(grids), GRID_CACHE_BYTES + max(grids))
-    of_field = round(SLACK * (_harmonic_bytes(path, planes * colors, size) + kept))
-    return of_length + of_blurs + of_field + max(blur.library_bytes for blur in directed)
+    before = of_length + of_blurs + round(SLACK * kept)
+    before += max(blur.library_bytes for blur in directed)
+    return before, before + round(SLACK * _harmonic_bytes(path, planes * colors, size))
 
 
 def _radial_bytes(path: OpticalPath, planes: int, size: TableSize) -> int:

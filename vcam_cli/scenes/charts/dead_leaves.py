@@ -45,9 +45,9 @@ FINEST = 1000
 1.47 of what 0.4, 0.6 and 0.8 of the smallest leaf's radius were asked to, undivided."""
 ROWS = round(PERIOD * FINEST)
 """Rows, and columns, of these cells."""
-PERIOD_BYTES = 22
-"""Memory that each of these cells takes for its visible leaves: 16.2 to 21.5 of twelve seeds
-[bytes]."""
+PERIOD_BYTES, PERIOD_PAINTING_BYTES = 22, 80
+"""Memory that each of these cells takes for its visible leaves, and each that is painted at once
+for temporary arrays: 16.2 to 21.5, and 50 to 80, of twelve seeds [bytes]."""
 COLUMNS = 1 << 25
 """Bytes of averages over columns that are kept: those of narrow rings, and the last ones."""
 UNDIVIDED = 600
@@ -66,13 +66,13 @@ an rms of 6e-5 in single cells, and of 1e-3 in those beyond, which lenses blur b
 EDGE_SECONDS = 0.035, 0.0135
 """Core seconds to find the edges that a frame sees, and more for each division of cells,
 calibrated."""
-PAINTING_BYTES = 8, 130, 180
+PAINTING_BYTES = 8, 180, 255
 """Temporary arrays of each cell, of each that an outline crosses, and of each in which two do, as
 often as it is looked at [bytes]: above those traced of ten seeds, 20 to 123 a cell with 700 to 1620
 cells a frame. Where a picture has many small leaves they are half as many again as in the mean."""
 SEEN_BYTES = 2, 20, 70
 """What is kept of them of visible leaves [bytes], likewise above the 5 to 41 a cell traced."""
-PUT_TOGETHER = 1.9
+PUT_TOGETHER = 1.45
 """Temporary arrays of cells that are painted in parts, over those of the parts alone: 14 to 46 MB
 of seven seeds on cells of 1/590 to 1/145 of the frame."""
 PART_SEEN_BYTES = 30, 37
@@ -357,18 +357,15 @@ class DeadLeaves(Chart):
 
     def painting_bytes(self, cells: PaintedCells) -> int:
         """Return the memory of temporary arrays of a thread, for cells and parts of them."""
-        parts, count, sums = self._parts_of(cells.pitch), cells.count, 0
         if self._reads_a_period(cells):
-            crossed, divided = self._crossed(self.unit / FINEST, 0.0)
-            parts, count, sums = 1, AT_ONCE, 2 * 8 * max(ROWS * cells.shape[1], AT_ONCE)
-        elif parts > 1:  # each errs on its own
-            crossed, divided = self._crossed(cells.pitch / parts, self.cell_error * parts)
-            count = min(parts**2 * count, AT_ONCE)
-        else:
-            crossed, divided = self._crossed(cells.pitch, self.cell_error)
+            return max(PERIOD_PAINTING_BYTES * AT_ONCE, 2 * 8 * max(ROWS * cells.shape[1], AT_ONCE))
+        parts, count = self._parts_of(cells.pitch), cells.count
+        crossed, divided = self._crossed(cells.pitch / parts, self.cell_error * parts)
         plain, once, twice = PAINTING_BYTES
         each = plain + once * crossed + twice * (1 + divided) * crossed**2
-        return max(round(each * count * (PUT_TOGETHER if parts > 1 else 1)), sums)
+        if parts > 1:
+            count, each = min(parts**2 * count, AT_ONCE), each * PUT_TOGETHER
+        return round(each * count)
 
     def kept_bytes(self, cells: PaintedCells) -> int:
         """Return the memory of leaves that are seen on cells, and on those of one period.
