@@ -66,10 +66,10 @@ an rms of 6e-5 in single cells, and of 1e-3 in those beyond, which lenses blur b
 EDGE_SECONDS = 0.035, 0.0135
 """Core seconds to find the edges that a frame sees, and more for each division of cells,
 calibrated."""
-PAINTING_BYTES = 8, 180, 255
+PAINTING_BYTES = 8, 184, 258
 """Temporary arrays of each cell, of each that an outline crosses, and of each in which two do, as
-often as it is looked at [bytes]: above those traced of ten seeds, 20 to 123 a cell with 700 to 1620
-cells a frame. Where a picture has many small leaves they are half as many again as in the mean."""
+often as it is looked at [bytes]: above those traced of ten seeds in bands of a quarter of a frame.
+Where a band has many small leaves they are twice as many as in the mean."""
 SEEN_BYTES = 2, 20, 70
 """What is kept of them of visible leaves [bytes], likewise above the 5 to 41 a cell traced."""
 PUT_TOGETHER = 1.45
