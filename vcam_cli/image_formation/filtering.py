@@ -42,9 +42,10 @@ STRETCHES = 10, 2
 frequencies, whose stretches are short, and of others."""
 SHORTEST = 8
 """Rows below which every row has its own transfer function."""
-KEPT = 1 << 16
-"""Terms of a filter up to which its pieces are kept, some 1 MB: pictures before one lens have it in
-common, and frames of 64 x 64 pixels of a data set take a tenth less."""
+KEPT = 1 << 19
+"""Terms of a filter, counted for every mixture and color, up to which its pieces are kept, 2 MB at
+most: pictures before one lens have it in common, and frames of 64 x 64 pixels of a data set take a
+tenth less."""
 
 Waves = tuple[bool, bool]
 """Whether waves along x, and along y, are sines."""
@@ -285,7 +286,7 @@ class Filter:
             if share_y is not None:
                 weights = weights * share_y[terms]
             found.append((target, list(self._rows(table, terms, weights, dtype))))
-        if self.x.terms * self.y.terms <= KEPT:
+        if has_few_terms(self.x, self.y, self.tables):
             self._kept[key] = found
         return found
 
@@ -392,6 +393,19 @@ class Filter:
 
         each(evaluate, [(c, s) for c in range(len(folded)) for s in columns], threads)
         return out if window is None else out[:, window]
+
+
+def has_few_terms(x: Axis, y: Axis, tables: Tables) -> bool:
+    """Return whether a filter has so few terms that its pieces are kept.
+
+    Parameters
+    ----------
+    x, y : Axis
+        Samples and pixels along x and y, with the terms that are filtered.
+    tables : Tables
+        Its transfer functions.
+    """
+    return x.terms * y.terms * math.prod(tables.shape) <= KEPT
 
 
 def working_bytes(x: Axis, y: Axis, planes: int, colors: int, width: int) -> tuple[int, int]:

@@ -56,7 +56,7 @@ from vcam_cli.image_formation.field_dependence import (
     filtered_layers,
     tabulate_field,
 )
-from vcam_cli.image_formation.filtering import KEPT, Filter
+from vcam_cli.image_formation.filtering import Filter, has_few_terms
 from vcam_cli.image_formation.harmonic_scenes import (
     harmonic_layers,
     harmonics_count,
@@ -329,7 +329,7 @@ def _filter(path: OpticalPath, scene: SampledScene, tables: Tables, highest: flo
     x, y = axes(path, scene, highest)
     # What is kept is small, pieces of few terms, and of tables that will be the same again.
     is_kept = tables.is_radial and tables.nbytes <= transfer_tables.KEPT
-    made = _kept_filter if is_kept and x.terms * y.terms <= KEPT else _made_filter
+    made = _kept_filter if is_kept and has_few_terms(x, y, tables) else _made_filter
     return made(x, y, tables, path.separable, reach(path))
 
 

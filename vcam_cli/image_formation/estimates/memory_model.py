@@ -33,7 +33,7 @@ from vcam_cli.scenes.bands import bands_of_rows
 from vcam_cli.scenes.base import ChartScene, PaintedCells, SampledScene
 from vcam_cli.scenes.hyperspectral import CubeScene, StoredSamples
 
-BASE = 147_000_000
+BASE = 144_000_000
 """Interpreter and libraries of `vcam run`: 126 to 138 MB were measured before uniform scenes; few
 frames import further modules. A call of the library takes 40 MB less [bytes]."""
 LATER = 10_000_000
