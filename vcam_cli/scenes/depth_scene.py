@@ -44,8 +44,7 @@ class DepthPicture:
     @property
     def nbytes(self) -> int:
         """Memory of both [bytes]."""
-        picture = self.picture.data if isinstance(self.picture, Cube) else self.picture
-        return int(picture.nbytes + self.depth.nbytes)
+        return int(self.picture.nbytes + self.depth.nbytes)
 
 
 @dataclass(frozen=True)
