@@ -12,9 +12,11 @@ import difflib
 import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from os import PathLike
 from typing import TypeVar
+
+from vcam_cli.records import dataclass
 
 T = TypeVar("T")
 Path = tuple[str | int, ...]

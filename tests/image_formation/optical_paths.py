@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,6 +21,7 @@ from vcam_cli.image_formation.pixel_response import scene_transfer
 from vcam_cli.image_formation.settings import STANDARD, Settings
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.physics.pupil_harmonics import direction_harmonics
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.base import Chart, ChartScene, Scene
 from vcam_cli.scenes.build import build
 from vcam_cli.scenes.framed import chart_scene

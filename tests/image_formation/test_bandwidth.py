@@ -7,7 +7,7 @@ scene followed as far as the engine goes: 24 pixel Nyquist frequencies, pictures
 
 import itertools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +44,7 @@ from vcam_cli.image_formation.light_plan import OMITTED_SHARE
 from vcam_cli.image_formation.optical_path import USED_SHARE
 from vcam_cli.image_formation.photon_rate import photo_rate
 from vcam_cli.image_formation.settings import STANDARD
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.base import Chart
 from vcam_cli.simulation.shared import RECENT
 from vcam_cli.simulation.simulate import prepare

@@ -1,7 +1,7 @@
 """Rings around a near field: they tile the margin, and their light is that of one fine grid."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -16,6 +16,7 @@ from vcam_cli.image_formation import far_field, strategies
 from vcam_cli.image_formation.far_field import far_parts, near_field
 from vcam_cli.image_formation.photon_rate import photo_rate
 from vcam_cli.image_formation.settings import REFERENCE, STANDARD
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.base import Chart, Frame
 from vcam_cli.scenes.charts.csf import Csf
 from vcam_cli.scenes.charts.hdr_patches import hdr_patches

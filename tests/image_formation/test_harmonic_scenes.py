@@ -1,6 +1,6 @@
 """A lattice of points in closed form, against the light of its discs added up in space."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -26,6 +26,7 @@ from vcam_cli.image_formation import harmonic_scenes, photon_rate
 from vcam_cli.image_formation.harmonic_scenes import harmonics_count
 from vcam_cli.image_formation.photon_rate import photo_rate
 from vcam_cli.image_formation.settings import REFERENCE
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.base import HarmonicScene
 from vcam_cli.scenes.charts.point_grid import PointGrid
 from vcam_cli.scenes.framed import chart_scene

@@ -1,7 +1,5 @@
 """What leaving out gains, veils, charges and the rest changes, against arrays written out."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 from making import camera
@@ -13,6 +11,7 @@ from vcam_cli.effects.pixel.dark_current import DarkCurrent
 from vcam_cli.effects.pixel.saturation import Saturation
 from vcam_cli.effects.pixel_signal import NeutralGain
 from vcam_cli.image_formation.pixelwise import changes_by_omission
+from vcam_cli.records import dataclass
 
 TIME, DARK, WELL = 0.5, 300.0, 500.0
 MOSAIC = Mosaic((("R", "G"), ("G", "B")))

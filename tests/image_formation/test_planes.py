@@ -1,7 +1,7 @@
 """Blurs that have a direction or change over the field, against sums in space."""
 
 import itertools
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -22,6 +22,7 @@ from vcam_cli.image_formation.scene_spectrum import SampledSpectrum, transform_p
 from vcam_cli.image_formation.settings import STANDARD
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.image_formation.transfer_tables import Tables, TableSize, mixtures, tabulate
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.waves import Wave, WaveScene
 from vcam_cli.spectra import Spectrum
 

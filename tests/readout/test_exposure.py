@@ -1,7 +1,5 @@
 """From the rate of electrons to codes: blocks, workers, clipping, the ADC's formula."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 from making import QUIET, camera, radiance_for
@@ -14,6 +12,7 @@ from vcam_cli.effects.noise.shot_noise import ShotNoise
 from vcam_cli.effects.pixel.dark_current import DarkCurrent
 from vcam_cli.effects.pixel.saturation import Saturation
 from vcam_cli.readout import exposure
+from vcam_cli.records import dataclass
 from vcam_cli.rng import BLOCK_ROWS
 
 SEEDS = {"sensor": 1, "frame": 1}

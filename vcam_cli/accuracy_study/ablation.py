@@ -9,7 +9,7 @@ its own, so that the difference of two frames is the effect and nothing else.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -23,6 +23,7 @@ from vcam_cli.effects.order import ORDER
 from vcam_cli.effects.pixel_signal import Charge
 from vcam_cli.effects.signal_chain import NoiseSource, Quantizer, full_well, noise_sources
 from vcam_cli.readout import binned_readout, exposure
+from vcam_cli.records import dataclass
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.solve.effects import camera_effects
 

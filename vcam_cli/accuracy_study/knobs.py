@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.simulation import Accuracy
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.blurs import FieldTransfer
+from vcam_cli.records import dataclass
 from vcam_cli.simulation.preparation import Prepared
 
 CONVERGED = 2e-5

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import statistics
 import time
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from vcam_cli.processing import process
 from vcam_cli.progress import Observer
 from vcam_cli.quality import display
 from vcam_cli.quality.scielab import s_cielab_map
+from vcam_cli.records import dataclass
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.scene_times import compute_frame
 from vcam_cli.simulation.shared import Shared

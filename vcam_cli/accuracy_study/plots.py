@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from vcam_cli.files.plots import (
     SMALLEST,
     plot_figure,
 )
+from vcam_cli.records import dataclass
 
 FLOOR = 1e-9
 """What is smaller is drawn here: an error of 0 has no place on a logarithmic axis."""

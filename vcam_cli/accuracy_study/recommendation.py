@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 from vcam_cli.accuracy_study import ablation
@@ -11,6 +10,7 @@ from vcam_cli.accuracy_study.knobs import KNOBS
 from vcam_cli.accuracy_study.setting_errors import Point
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.simulation import PRESETS
+from vcam_cli.records import dataclass
 
 WORTH = 0.9
 """Part of the seconds below which another setting is recommended."""

@@ -9,7 +9,7 @@ larger.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.signal_chain import NoiseSource, Quantizer
 from vcam_cli.floats import rms
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.base import ChartScene
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.simulate import prepare

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from vcam_cli.accuracy_study import ablation
@@ -12,6 +12,7 @@ from vcam_cli.accuracy_study.measurements import Shot
 from vcam_cli.accuracy_study.setting_errors import FLOOR
 from vcam_cli.camera.camera import Camera
 from vcam_cli.floats import rms
+from vcam_cli.records import dataclass
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.simulate import prepare
 from vcam_cli.solve.settings import camera_settings

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from vcam_cli.records import dataclass
 
 COLUMNS = (
     "knob",

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, field, replace
 from typing import Any
 
 from vcam_cli.accuracy_study import ablation, recommendation
@@ -50,6 +50,7 @@ from vcam_cli.devices.choice import open_device
 from vcam_cli.floats import own_float_errors, rms
 from vcam_cli.parallel import available_workers
 from vcam_cli.progress import Observer, Silent
+from vcam_cli.records import dataclass
 from vcam_cli.simulation.shared import Shared
 from vcam_cli.simulation.simulate import threads
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +19,7 @@ from vcam_cli.readout import exposure
 from vcam_cli.readout.batched_sites import SensorMaps, sites
 from vcam_cli.readout.chain import ReadoutChain
 from vcam_cli.readout.device_capture import require_linear
+from vcam_cli.records import dataclass
 from vcam_cli.simulation.frame import pedestal
 from vcam_cli.solve.solved import Solved
 

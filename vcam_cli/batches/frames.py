@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -29,6 +28,7 @@ from vcam_cli.floats import own_float_errors
 from vcam_cli.parallel import suitable_workers
 from vcam_cli.processing.demosaic import bilinear_rows
 from vcam_cli.readout import auto_exposure, exposure
+from vcam_cli.records import dataclass
 from vcam_cli.simulation.reading import with_own_files
 from vcam_cli.solve.solved import Solved, solve
 

@@ -7,7 +7,6 @@ picture is computed as that of a single frame, and copied.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from vcam_cli.image_formation.photon_rate import on_mosaics
 from vcam_cli.image_formation.strategies import picture_filter
 from vcam_cli.progress import Stages
 from vcam_cli.readout.layout import Layout
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.image import ImageScene
 from vcam_cli.simulation.pipeline import prepare_light
 from vcam_cli.simulation.run import Run

@@ -1,7 +1,7 @@
 """Numbers of the lens that change with the wavelength: a table, straight in between."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from vcam_cli.config.lists import read_items
 from vcam_cli.config.quantities import Numeric
 from vcam_cli.config.validation_messages import describe
 from vcam_cli.config.yaml_type import YamlType
+from vcam_cli.records import dataclass
 
 NANO = 1e-9
 SHORTEST, LONGEST = 100.0, 20000.0

@@ -6,7 +6,6 @@ import math
 import operator
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from pydantic_core import InitErrorDetails
@@ -17,6 +16,7 @@ from vcam_cli.config.lists import list_of
 from vcam_cli.config.validation_messages import describe, fault, one_of
 from vcam_cli.config.values import Either
 from vcam_cli.errors import BadInput, Problem
+from vcam_cli.records import dataclass
 
 EXPECT = "expect"
 """The key of a file; the option is --expect."""

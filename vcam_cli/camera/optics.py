@@ -3,7 +3,6 @@
 import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -33,6 +32,7 @@ from vcam_cli.config.values import (
 )
 from vcam_cli.config.yaml_type import YamlType, to_yaml
 from vcam_cli.physics.opening import CIRCLE, Opening
+from vcam_cli.records import dataclass
 
 LEAST_F_NUMBER, MOST_F_NUMBER = 0.5, 1e4
 """A sharp image in air has no less than f/0.5, where the cone of light is a half space (Abbe's sine

@@ -9,7 +9,7 @@ import contextlib
 import math
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
@@ -27,6 +27,7 @@ from vcam_cli.config.values import Choice, File, Gap
 from vcam_cli.config.yaml_type import DEFINED, YamlType, to_yaml
 from vcam_cli.errors import BadInput, Path, bad, data_file_problems
 from vcam_cli.physics import photodiode, silicon
+from vcam_cli.records import dataclass
 from vcam_cli.spectra.spectrum import Outside
 
 Points = tuple[tuple[float, float], ...]

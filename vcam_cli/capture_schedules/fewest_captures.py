@@ -5,7 +5,8 @@ bisection find the fewest with some 2 log2(N) schedules a target, and targets sh
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+
+from vcam_cli.records import dataclass
 
 SLACK = 1e-12
 """Relative: a gain that misses a target by its own rounding error reaches it."""

@@ -8,7 +8,6 @@ just not fill the well is half of the time read a capture earlier: that loss is 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +16,7 @@ from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.signal_chain import Limit
 from vcam_cli.parallel import each
 from vcam_cli.readout import nondestructive_samples
+from vcam_cli.records import dataclass
 from vcam_cli.rng import blocks
 from vcam_cli.scheduling import estimators
 from vcam_cli.scheduling.pdf import Floats

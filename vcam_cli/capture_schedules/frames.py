@@ -14,7 +14,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -35,6 +35,7 @@ from vcam_cli.files.tables import write_table
 from vcam_cli.parallel import available_workers
 from vcam_cli.progress import Observer, Silent
 from vcam_cli.readout import sample_times
+from vcam_cli.records import dataclass
 from vcam_cli.scheduling.comparison_schedules import heuristic_photocurrents
 from vcam_cli.scheduling.histogram_binning import merge_bins
 from vcam_cli.scheduling.objective import expected_snr

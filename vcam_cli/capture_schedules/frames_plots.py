@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from vcam_cli.arrays import Array
 from vcam_cli.files.images.png import write_png
 from vcam_cli.files.plots import COLORS, SMALL, plot_figure
+from vcam_cli.records import dataclass
 
 Square = tuple[slice, slice]
 """Rows and columns of a part of a picture."""

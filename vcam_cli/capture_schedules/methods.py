@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from vcam_cli.capture_schedules.model import ScheduleStudy
+from vcam_cli.records import dataclass
 from vcam_cli.scheduling import full_noise, objective, shot_noise, weighted_schedules
 from vcam_cli.scheduling.brackets import bracket_bound, bracket_snr, optimal_bracket
 from vcam_cli.scheduling.comparison_schedules import (

@@ -10,7 +10,6 @@ planned. The least number of captures that loses no more is where it may switch 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 from vcam_cli.files import curves
 from vcam_cli.files.curves import Curve, Panel
 from vcam_cli.files.plots import COLORS
+from vcam_cli.records import dataclass
 from vcam_cli.scheduling import estimators, full_noise
 from vcam_cli.scheduling.objective import expected_snr
 from vcam_cli.scheduling.online import ExposureSearch, plan_times

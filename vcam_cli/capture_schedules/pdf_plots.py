@@ -7,7 +7,6 @@ that equal areas are equal shares of the pixels on either axis.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.files.plots import COLORS, GRAY, LIGHT_GRAY, SMALL, plot_figure
+from vcam_cli.records import dataclass
 from vcam_cli.scheduling.pdf import Floats, Indices, Pdf
 
 WIDE = 0.05

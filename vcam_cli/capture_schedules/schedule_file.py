@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -30,6 +30,7 @@ from vcam_cli.config.study_overrides import lay_over, split_sets
 from vcam_cli.config.yaml_reader import display_path, read_file
 from vcam_cli.config.yaml_tree import Node, Origin
 from vcam_cli.errors import BadInput, Problem
+from vcam_cli.records import dataclass
 from vcam_cli.scheduling.pdf import Pdf
 from vcam_cli.simulation import checks
 from vcam_cli.simulation.output import provenance

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,7 @@ from vcam_cli.capture_schedules.pdf_plots import (
 )
 from vcam_cli.capture_schedules.schedule_result import ScheduleResult
 from vcam_cli.files.plots import COLORS, DASHES, GRAY, INK, LIMIT, MARK, SMALL, plot_figure
+from vcam_cli.records import dataclass
 from vcam_cli.scheduling.pdf import Pdf
 from vcam_cli.scheduling.sensor import Sensor
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ from vcam_cli.capture_schedules.methods import MethodResult, Task
 from vcam_cli.capture_schedules.online_loss import OnlineLoss
 from vcam_cli.capture_schedules.photocurrents import Approximation
 from vcam_cli.capture_schedules.schedule_file import ScheduleFile
+from vcam_cli.records import dataclass
 from vcam_cli.scheduling.pdf import Pdf
 
 

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -42,6 +42,7 @@ from vcam_cli.errors import bad
 from vcam_cli.progress import Stages
 from vcam_cli.quality.mtf import Lattice
 from vcam_cli.readout import device_capture, exposure
+from vcam_cli.records import dataclass
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.simulate import prepare
 from vcam_cli.solve.raised_codes import RaisedCodes

@@ -8,7 +8,7 @@ nothing of the file. Its closed forms stand beside each number (`datasheet.py`).
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from vcam_cli.camera.camera import Camera
@@ -25,6 +25,7 @@ from vcam_cli.errors import BadInput, CannotDo
 from vcam_cli.floats import own_float_errors
 from vcam_cli.parallel import available_workers
 from vcam_cli.progress import Observer, Silent, Stages
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -30,6 +30,7 @@ from vcam_cli.quality.photon_transfer import (
     linearity,
     sensitivity_threshold,
 )
+from vcam_cli.records import dataclass
 from vcam_cli.spectra import Spectrum, illuminant
 
 COLUMNS = ("quantity", "channel", "measured", "expected", "unit", "definition")

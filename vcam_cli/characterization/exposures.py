@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,6 +25,7 @@ from vcam_cli.quality.photon_transfer import (
     pair_statistics,
     photon_transfer,
 )
+from vcam_cli.records import dataclass
 
 EVEN_LEVELS = 50
 """Levels evenly spaced up to saturation: the minimum of EMVA 1288."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from vcam_cli.arrays import Array
@@ -11,6 +9,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.characterization.bench import prepare_even
 from vcam_cli.progress import Stages
 from vcam_cli.readout import several_readouts
+from vcam_cli.records import dataclass
 
 LEVELS = 33
 """Levels of light, from 1 electron to 95 % of the merge's saturation."""

@@ -9,7 +9,6 @@ Fig 1.4 and eqs 2.30 and 2.31 (photocurrent and dark current of three regions).
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from vcam_cli.camera import load as cameras
 from vcam_cli.camera.camera import Camera
@@ -20,6 +19,7 @@ from vcam_cli.camera.derived.process import Need, Process, process
 from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.errors import BadInput
 from vcam_cli.physics import photodiode, silicon
+from vcam_cli.records import dataclass
 
 KINDS = ("ndiff-psub", "nwell-psub", "photogate", "pinned")
 WAVELENGTHS = (450e-9, 550e-9, 650e-9)

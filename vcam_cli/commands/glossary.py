@@ -5,13 +5,13 @@ A test holds that every column, metric and quantity that a file has is explained
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 import yaml
 
 from vcam_cli.config.yaml_reader import LOADER
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

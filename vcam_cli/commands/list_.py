@@ -1,13 +1,13 @@
 """`vcam list`: what ships."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from vcam_cli.commands import options
+from vcam_cli.records import dataclass
 
 PARTS = ("scenes", "optics", "pixels", "arrays")
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -24,6 +23,7 @@ from vcam_cli.quality.display import D65, Screen, rgb_to_xyz
 from vcam_cli.quality.eye import Filters
 from vcam_cli.quality.mse import mse, psnr_of_mse
 from vcam_cli.quality.scielab import cielab_map, s_cielab_map
+from vcam_cli.records import dataclass
 
 Space = Literal["srgb", "linear-srgb", "xyz"]
 _ENCODINGS = {None: "auto", "srgb": "srgb", "linear-srgb": "linear", "xyz": "linear"}

@@ -9,7 +9,7 @@ in one section keeps back only the checks that need it.
 import operator
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Generic
 
@@ -23,6 +23,7 @@ from vcam_cli.config.merge import merge
 from vcam_cli.config.parts import Findings, PartReader
 from vcam_cli.config.yaml_tree import Key, Node, Origin, Source, child_path, node_of
 from vcam_cli.errors import BadInput, Problem
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

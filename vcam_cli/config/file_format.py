@@ -1,7 +1,7 @@
 """Description of a package's file kinds, as their reader needs it."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Generic, TypeVar
 
 from vcam_cli import errors
@@ -9,6 +9,7 @@ from vcam_cli.config.merge import NO_RULES, MergeRules
 from vcam_cli.config.model import FileModel
 from vcam_cli.config.yaml_tree import Key, Node
 from vcam_cli.errors import Problem
+from vcam_cli.records import dataclass
 
 M = TypeVar("M", bound=FileModel)
 Check = tuple[Callable[[M], None], str]

@@ -1,7 +1,6 @@
 """All keys that a model's files may have, by their paths."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any, get_args
 
@@ -10,6 +9,7 @@ from pydantic import BaseModel
 from vcam_cli.config.validation_messages import key_fields, yaml_text
 from vcam_cli.config.yaml_type import YamlType
 from vcam_cli.errors import Path, dotted_path
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,13 @@ Keys laid over the name of a part change that part.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 
 from vcam_cli import errors
 from vcam_cli.config.yaml_tree import Key, Node, child_path
 from vcam_cli.errors import BadInput
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ a value ("auto", "none") the type lists it: `Quantity("length", words={"auto": N
 import math
 from abc import abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from decimal import Decimal
 from types import MappingProxyType
 from typing import Any
@@ -16,6 +16,7 @@ from typing import Any
 from vcam_cli import units
 from vcam_cli.config.validation_messages import describe, one_of, refusal
 from vcam_cli.config.yaml_type import DEFINED, YamlType
+from vcam_cli.records import dataclass
 
 NO_WORDS: Mapping[str, Any] = MappingProxyType({})
 LEAST_SIZE, MOST_SIZE = 1e-45, 1e45

@@ -1,7 +1,7 @@
 """The types of keys: the usual quantities, words, files, and one of several forms."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, Strict, StringConstraints
@@ -9,6 +9,7 @@ from pydantic import BaseModel, Strict, StringConstraints
 from vcam_cli.config.quantities import NO_WORDS, Number, Percentage, Quantity
 from vcam_cli.config.validation_messages import describe, key_fields, one_of, refusal
 from vcam_cli.config.yaml_type import YamlType, to_yaml
+from vcam_cli.records import dataclass
 
 MOST_ELECTRONS = 1e9
 """Most electrons of a noise: beyond any well, and its square is still a number in 32 bits."""

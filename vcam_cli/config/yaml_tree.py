@@ -1,7 +1,7 @@
 """A tree of YAML values that know where they stand in a file."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -9,6 +9,7 @@ from pathlib import Path
 from vcam_cli import errors
 from vcam_cli.arguments import brief
 from vcam_cli.errors import Problem
+from vcam_cli.records import dataclass
 
 Scalar = str | int | float | bool | None
 Key = str | int | float

@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from contextlib import ExitStack
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from threading import Lock
@@ -31,6 +30,7 @@ from vcam_cli.files.records import Fingerprint
 from vcam_cli.files.report import hash_text, to_json
 from vcam_cli.parallel import ThreadPool
 from vcam_cli.progress import Observer, Silent
+from vcam_cli.records import dataclass
 from vcam_cli.simulation.output import provenance
 from vcam_cli.sweeps.execution import Execution
 from vcam_cli.sweeps.point_execution import claim_point, compute, keep_outcome

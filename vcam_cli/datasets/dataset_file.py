@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import glob
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
 
@@ -22,6 +22,7 @@ from vcam_cli.datasets.model import Dataset
 from vcam_cli.errors import BadInput, Collector, Problem
 from vcam_cli.files.images.images import picture_size
 from vcam_cli.floats import own_float_errors
+from vcam_cli.records import dataclass
 from vcam_cli.simulation.checks import CHECKS
 from vcam_cli.sweeps.model import KINDS
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections import OrderedDict, defaultdict
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +27,7 @@ from vcam_cli.errors import BadInput, CannotDo
 from vcam_cli.files.images.images import read_picture
 from vcam_cli.files.report import to_json
 from vcam_cli.floats import own_float_errors
+from vcam_cli.records import dataclass
 from vcam_cli.units import parse
 
 BATCH = 64

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,7 @@ from vcam_cli.config.document import Document
 from vcam_cli.config.yaml_tree import Node, Source, node_of, tree_at
 from vcam_cli.datasets.model import Dataset, Distribution
 from vcam_cli.errors import BadInput, Problem, split
+from vcam_cli.records import dataclass
 from vcam_cli.rng import stream
 from vcam_cli.simulation.checks import CHECKS
 from vcam_cli.solve.light_key import changes_light

@@ -16,12 +16,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
 from vcam_cli import units
+from vcam_cli.records import dataclass
 from vcam_cli.units import DIMENSIONS
 
 LONGEST, DEEPEST = 400, 20

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import partial
 from itertools import chain
 
@@ -26,6 +26,7 @@ from vcam_cli.parallel import ThreadPool, suitable_workers
 from vcam_cli.quality.photon_transfer import ROUNDING
 from vcam_cli.readout.chain import ReadoutChain
 from vcam_cli.readout.exposure import mean_dark
+from vcam_cli.records import dataclass
 from vcam_cli.simulation.exposures import exposures, share_light
 from vcam_cli.simulation.photograph import Photograph
 from vcam_cli.simulation.shared import Shared

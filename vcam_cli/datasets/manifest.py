@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ from vcam_cli.datasets.dataset_file import DatasetFile
 from vcam_cli.datasets.frame_work import Record, read_records
 from vcam_cli.datasets.shards import Packer, Shard
 from vcam_cli.files import tables
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -25,6 +24,7 @@ from vcam_cli.files.images import tiff
 from vcam_cli.files.points_store import SweepFolder
 from vcam_cli.files.records import Fingerprint, Proofs, file_fingerprint, remember
 from vcam_cli.files.report import hash_text, to_json
+from vcam_cli.records import dataclass
 
 Stored = tuple[frame_archive.Archive, str, str, str]
 """An array: the archive of its part and its name there, the name of its frame, its kind."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import ClassVar
 
@@ -19,6 +18,7 @@ from vcam_cli.effects.base import Effect
 from vcam_cli.effects.warps import Magnification
 from vcam_cli.physics import pupil_harmonics
 from vcam_cli.physics.ray_spot import RaySpot
+from vcam_cli.records import dataclass
 
 INTERPOLATION = 28_000_000
 """Memory of SciPy's interpolation and of all that it imports [bytes]."""

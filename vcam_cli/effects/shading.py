@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.effects.pixel_signal import Gain
+from vcam_cli.records import dataclass
 
 LARGEST = 64.0
 """Of the factors: what is darker than that is left dark."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Callable, Collection, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import ClassVar, Literal, Self
 
 import numpy as np
@@ -14,6 +14,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.sensor.array import Binning
 from vcam_cli.effects.base import Effect, SignalLevels, of_kind
 from vcam_cli.physics import noise
+from vcam_cli.records import dataclass
 from vcam_cli.rng import Stream, coarse_normals
 
 SIGMAS = 6.0

@@ -6,7 +6,6 @@ The look is that of `plots.py`: the same colors, the same bytes for the same num
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -23,6 +22,7 @@ from vcam_cli.files.plots import (
     color_of,
     plot_figure,
 )
+from vcam_cli.records import dataclass
 
 Look = Literal["points", "line", "dashed"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from vcam_cli.fitting.noise_shape import difference_counts
 from vcam_cli.fitting.pattern import Pattern, pattern
 from vcam_cli.fitting.traps import PixelMoments, pixel_moments
 from vcam_cli.progress import Observer
+from vcam_cli.records import dataclass
 from vcam_cli.spectra import integral, photons
 from vcam_cli.verification.frame_sets import FrameSet
 from vcam_cli.verification.frames import color_planes, stacks

@@ -8,13 +8,13 @@ the MTF of the lens, or of the silicon: it goes into the camera file as `optics.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.physics.diffraction import cutoff_frequency
 from vcam_cli.quality.mtf import EdgeResponse
+from vcam_cli.records import dataclass
 from vcam_cli.verification.model import Measurement
 from vcam_cli.verification.stack_statistics import Estimate
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from vcam_cli.fitting.noise_shape import is_significant
+from vcam_cli.records import dataclass
 from vcam_cli.verification.stack_statistics import Estimate
 
 SIGMAS = 1.6448536269514722

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.fitting.noise_shape import is_significant
 from vcam_cli.quality import nonuniformity, rounding
+from vcam_cli.records import dataclass
 from vcam_cli.verification.stack_statistics import (
     Estimate,
     StackStatistics,

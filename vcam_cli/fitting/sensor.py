@@ -7,7 +7,7 @@ Gain and responsivity are those of EMVA 1288, by the estimators that `vcam chara
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from vcam_cli.quality.photon_transfer import (
     photon_transfer,
 )
 from vcam_cli.quality.rounding import LIMIT
+from vcam_cli.records import dataclass
 from vcam_cli.verification.model import Measurement
 from vcam_cli.verification.stack_statistics import Estimate, combine
 

@@ -21,12 +21,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.records import dataclass
 from vcam_cli.verification.stack_statistics import Estimate
 
 LEAST_FRAMES = 6

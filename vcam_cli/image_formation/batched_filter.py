@@ -9,7 +9,6 @@ both; so a picture of as many samples as pixels has one factor a sample, mixture
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.devices.processor import Processor
 from vcam_cli.image_formation.cosine_series import Axis, segments
 from vcam_cli.image_formation.filtering import Filter
+from vcam_cli.records import dataclass
 
 
 def _distinguished(axis: Axis) -> int:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -17,6 +16,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.scene_spectrum import Index, Pair, SceneSpectrum, pairs
 from vcam_cli.parallel import AT_ONCE, PRODUCT, product, slices_within
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.base import ChartScene
 from vcam_cli.scenes.cells import cell_edges
 from vcam_cli.scenes.closed_form import LightDisc, Rectangles

@@ -27,7 +27,6 @@ is turned in each row: its real part is one transform of real numbers, of twice 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property, lru_cache, reduce
 
 import numpy as np
@@ -35,6 +34,7 @@ import scipy.fft
 
 from vcam_cli.arrays import Array
 from vcam_cli.devices.processor import PROCESSOR, Processor
+from vcam_cli.records import dataclass
 
 NEAR = 1e-7
 """Distances below this are rounding errors [pixel pitches]."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy.fft
@@ -26,6 +26,7 @@ from vcam_cli.image_formation.field_dependence import Mode, filtered_layers
 from vcam_cli.image_formation.filtering import Filter
 from vcam_cli.image_formation.optical_path import Layer, OpticalPath
 from vcam_cli.image_formation.scene_spectrum import SceneSpectrum, transform_planes
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.base import ChartScene
 
 NEAR = 12.0

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -38,6 +38,7 @@ from vcam_cli.image_formation.transfer_tables import (
     radial_table,
 )
 from vcam_cli.physics.interpolation import between_entries
+from vcam_cli.records import dataclass
 
 CUBIC = 4
 """Entries that a polynomial between those of a coarse table goes through."""

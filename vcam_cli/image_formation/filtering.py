@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
@@ -22,6 +22,7 @@ from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.scene_spectrum import Pair, SceneSpectrum
 from vcam_cli.image_formation.transfer_tables import PARITIES, TableReader, Tables, reader
 from vcam_cli.parallel import each, pieces, product, rows_at_once, slices_within
+from vcam_cli.records import dataclass
 
 LONGEST = 128
 """Rows of a spectrum that are filtered together."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from itertools import combinations
 
 import numpy as np
@@ -32,6 +32,7 @@ from vcam_cli.effects.warps import StillWarp, Warp
 from vcam_cli.image_formation.estimates.edge_changes import exact_changes, has_straight_edges
 from vcam_cli.image_formation.estimates.light_cost import FIRST, LightCost
 from vcam_cli.image_formation.optical_path import OpticalPath
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.base import ChartScene
 from vcam_cli.scenes.blur_change import BlurLoss
 from vcam_cli.scenes.depth_scene import DepthScene

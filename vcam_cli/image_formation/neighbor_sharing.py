@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +12,7 @@ from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.camera.sensor.crosstalk import Kernels
 from vcam_cli.effects.pixel_signal import NeighborSharing
 from vcam_cli.image_formation.pixel_response import PixelResponse, axis_levels
+from vcam_cli.records import dataclass
 from vcam_cli.spectra import Spectrum
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,6 +18,7 @@ from vcam_cli.effects.blurs import FieldTransfer, SeparableTransfer, Zone
 from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.transfer_functions import Transfer
+from vcam_cli.records import dataclass
 
 USED_SHARE = 0.95
 """Part of the tolerance that all errors of the mean signal may use together."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -27,6 +27,7 @@ from vcam_cli.image_formation.optical_path import Layer, OpticalPath, SpectrumRe
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.warps import covered, warped_layers
 from vcam_cli.parallel import each
+from vcam_cli.records import dataclass
 from vcam_cli.rng import runs_of_blocks
 from vcam_cli.scenes.base import View
 from vcam_cli.scenes.layered import AnyScene

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from vcam_cli.arrays import Array
 from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.blurs import Blur
 from vcam_cli.effects.pixel_signal import Gain
 from vcam_cli.image_formation.transfer_functions import Band, Transfer, transfer
+from vcam_cli.records import dataclass
 from vcam_cli.spectra import Spectrum
 
 

@@ -7,7 +7,6 @@ thousand pixels, what each of them changes.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.pixel_signal import Charge, Gain, VeilingGlare
 from vcam_cli.effects.signal_chain import Limit
+from vcam_cli.records import dataclass
 
 SAMPLE = 1 << 14
 """Pixels that are computed, at most. A matter of cost: an rms over them has a standard error of

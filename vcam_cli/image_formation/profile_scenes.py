@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -29,6 +28,7 @@ from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.blurs import Blur
 from vcam_cli.image_formation.optical_path import Layer, Layers, OpticalPath, SpectrumReport
 from vcam_cli.parallel import product
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.closed_form import Profile
 
 SHARE = 0.02

@@ -7,11 +7,11 @@ again, and that is most of a frame's cost. Cameras of the same key (`solve.light
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from vcam_cli.cache import ByteCache
 from vcam_cli.image_formation.photon_rate import Rate
 from vcam_cli.image_formation.transfer_functions import Transfer
+from vcam_cli.records import dataclass
 
 _LIMIT = 1 << 28
 """Bytes of light that are kept."""

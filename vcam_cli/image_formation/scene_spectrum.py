@@ -6,7 +6,7 @@ Planes of samples are transformed; charts in closed form are not sampled (`close
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations_with_replacement
 from typing import Protocol
 
@@ -17,6 +17,7 @@ from numpy.typing import DTypeLike
 from vcam_cli.arrays import Array
 from vcam_cli.devices.processor import Processor
 from vcam_cli.parallel import each, pieces, rows_at_once, slices_within
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.bands import bands_of_rows, paint_by_bands
 from vcam_cli.scenes.base import ChartScene
 

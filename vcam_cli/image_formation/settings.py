@@ -8,9 +8,11 @@ pictures; `reference` also computes in 64 bits, but for charts, and `draft` draw
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 
 import numpy as np
+
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -29,6 +29,7 @@ from vcam_cli.effects.temporal.sub_exposed_motion import SubExposedMotion
 from vcam_cli.image_formation.estimates import memory_model
 from vcam_cli.image_formation.optical_path import Layer, Layers, OpticalPath, SpectrumReport
 from vcam_cli.parallel import each, pieces
+from vcam_cli.records import dataclass
 from vcam_cli.rng import blocks
 from vcam_cli.scenes.base import Scene
 from vcam_cli.scenes.waves import WaveScene

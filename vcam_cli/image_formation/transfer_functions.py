@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -25,6 +25,7 @@ from vcam_cli.cache import ByteCache, remembered
 from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.blurs import Blur, GeometricTransfer, PlaneTransfer, RadialTransfer
 from vcam_cli.parallel import pieces, product
+from vcam_cli.records import dataclass
 from vcam_cli.spectra import Spectrum, pair_weights, photons
 
 VALUES = 1 << 17

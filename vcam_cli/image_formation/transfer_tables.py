@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -23,6 +23,7 @@ from vcam_cli.effects.blurs import Blur, GeometricTransfer, PlaneTransfer
 from vcam_cli.image_formation.scene_spectrum import Pair, pairs
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.parallel import product, slices_within
+from vcam_cli.records import dataclass
 
 PARITIES = ((False, False), (True, True), (True, False), (False, True))
 """Whether a transfer function turns the cosines along x, and along y, into sines."""

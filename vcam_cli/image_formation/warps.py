@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from itertools import chain
 
@@ -41,6 +41,7 @@ from vcam_cli.image_formation.estimates.bandwidth import highest_passed, margin,
 from vcam_cli.image_formation.estimates.lens_contrast import lens_contrast
 from vcam_cli.image_formation.optical_path import Layers, OpticalPath, SpectrumReport
 from vcam_cli.image_formation.strategies import image_layers
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.base import Chart, ChartScene, Frame, HarmonicScene, Scene
 from vcam_cli.scenes.charts.sinusoid import WaveChart
 from vcam_cli.scenes.depth_scene import DepthScene

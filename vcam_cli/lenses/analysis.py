@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.lenses.fields import View
 from vcam_cli.lenses.tracing import points, sag
+from vcam_cli.records import dataclass
 
 SPOT_RINGS = 8
 """Rings of rays of a spot diagram."""

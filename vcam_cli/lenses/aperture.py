@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 from vcam_cli.lenses.paraxial import paraxial
 from vcam_cli.lenses.prescription import Prescription
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

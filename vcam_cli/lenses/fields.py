@@ -18,7 +18,7 @@ References
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -27,6 +27,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.lenses.paraxial import Paraxial, paraxial
 from vcam_cli.lenses.prescription import Prescription
 from vcam_cli.lenses.tracing import Rays, Trace, trace
+from vcam_cli.records import dataclass
 
 AIM_STEPS = 40
 AIMED = 3e-13

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -16,6 +15,7 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.errors import nearest
+from vcam_cli.records import dataclass
 
 TABLE = Path(__file__).parents[1] / "data" / "glasses.csv"
 LINE_G, LINE_F, LINE_D, LINE_C = 435.8343e-9, 486.1327e-9, 587.5618e-9, 656.2725e-9

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.lenses.prescription import Prescription, Surface
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

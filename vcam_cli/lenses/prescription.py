@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.lenses.glasses import AIR, Glass
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.lenses.fields import View, reversed_lens
 from vcam_cli.lenses.tracing import Rays, Trace, trace
+from vcam_cli.records import dataclass
 
 ANGLES = 256
 """Directions in which the edge is sought: corners of vignetted pupils cost 1e-5 of the area."""

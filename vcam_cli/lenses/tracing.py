@@ -10,12 +10,13 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.lenses.prescription import Surface
+from vcam_cli.records import dataclass
 
 STEPS = 30
 """Newton's steps to an asphere at most: six are enough but where a ray grazes it."""

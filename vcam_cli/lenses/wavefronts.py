@@ -7,7 +7,6 @@ paths at a few wavelengths, between which polynomials in the wavenumber go.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -18,6 +17,7 @@ from vcam_cli.lenses.pupils import beam_edges
 from vcam_cli.physics import shaped_pupil
 from vcam_cli.physics.interpolation import lagrange
 from vcam_cli.physics.shaped_pupil import Mask, OtfGrid
+from vcam_cli.records import dataclass
 
 ORDER = 12
 """Radial order of the polynomials: they leave 1e-3 waves of the lenses that ship, at full size."""

@@ -10,13 +10,12 @@ References
    Devices 41(3), 452-453, 1994, doi:10.1109/16.275235 (photogate, floating diffusion).
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vcam_cli.physics.readout import ELEMENTARY_CHARGE
 from vcam_cli.physics.silicon import PERMITTIVITY
+from vcam_cli.records import dataclass
 from vcam_cli.spectra import BOLTZMANN
 
 Floats = NDArray[np.float64]

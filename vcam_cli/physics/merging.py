@@ -19,12 +19,12 @@ reconstruction with linear digital cameras, CVPR 2010, doi:10.1109/CVPR.2010.554
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.records import dataclass
 
 Rule = Literal["snr", "switch"]
 

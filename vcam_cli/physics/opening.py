@@ -9,7 +9,6 @@ lie on that circle.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -17,6 +16,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.physics import shaped_pupil
 from vcam_cli.physics.shaped_pupil import Mask
+from vcam_cli.records import dataclass
 
 SHARE_SAMPLES = 1024
 """Samples across for the area of what spiders cover: it is known to 1e-5 of the circle."""

@@ -14,7 +14,6 @@ Why not an integral at each frequency: it costs a thousand times as much over a 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -23,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from vcam_cli.arrays import Array
 from vcam_cli.physics import zernike
 from vcam_cli.physics.zernike import Floats, Terms
+from vcam_cli.records import dataclass
 
 MIN_SAMPLES = 192
 """Samples across the pupil at least, and 8 more for each order of the polynomials."""

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,6 +23,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.physics import zernike
 from vcam_cli.physics.interpolation import lagrange
 from vcam_cli.physics.zernike import Floats, Terms
+from vcam_cli.records import dataclass
 
 MOST_SLOPE = 8.0
 """Slope of a wavefront up to which it is computed so [wavelengths per pupil radius]: from there on

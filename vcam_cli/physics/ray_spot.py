@@ -16,12 +16,12 @@ which is 0 where a or b is beyond the spot, and is a sum of few products of one 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.records import dataclass
 
 NODES = 129
 """Places over a radius at which the products are known; straight lines between them err by 1e-5 of

@@ -17,13 +17,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.physics import diffraction
+from vcam_cli.records import dataclass
 
 FEWEST, MOST = 128, 640
 """Samples across a pupil."""

@@ -10,12 +10,12 @@ picture, `process_colors` on full-color values: the ideal image, and the white t
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 import numpy as np
 
 from vcam_cli.parallel import results
+from vcam_cli.records import dataclass
 from vcam_cli.spectra import Spectrum
 
 ROW_STEP, MAX_BLOCK_ROWS = 16, 64

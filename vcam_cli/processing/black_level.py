@@ -3,11 +3,10 @@
 Values below black stay negative, so that noise keeps its mean of zero; the tone curve clips them.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from vcam_cli.processing.base import Block
+from vcam_cli.records import dataclass
 
 
 def subtracted_level(value: str | float, black_dn: float) -> float:

@@ -12,11 +12,10 @@ The method is named in Chen 2003, section 2.3.5, as an extension of gray world, 
 details; block size and share are choices made here.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from vcam_cli.processing.base import Block, Context
+from vcam_cli.records import dataclass
 
 BLOCK_SIDE = 16
 """Side of a block [pixels]; divides the rows that processing works on at a time."""

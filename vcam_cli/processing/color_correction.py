@@ -26,13 +26,13 @@ References
 .. [3] CIE 015:2018, Colorimetry, 4th edition, doi:10.25039/TR.015.2018.
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from vcam_cli.processing.base import Block, Patches
 from vcam_cli.processing.white_balance import MIN_COLOR_SHARE
+from vcam_cli.records import dataclass
 from vcam_cli.spectra import Spectrum, cmf, colorchecker, pair_weights
 
 DISPLAY = ("R", "G", "B")

@@ -13,11 +13,10 @@ References
    Imaging 11(3), 2002, section 3.2, doi:10.1117/1.1484495.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from vcam_cli.processing.base import Block, Pattern, mirrored_index
+from vcam_cli.records import dataclass
 
 
 def is_bayer(pattern: Pattern) -> bool:

@@ -1,7 +1,7 @@
 """A picture on its way through the steps of processing."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy as np
 from vcam_cli.processing import tone
 from vcam_cli.processing.base import Context, Operation
 from vcam_cli.processing.picture import apply_operations
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

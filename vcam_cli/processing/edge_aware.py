@@ -28,11 +28,10 @@ References
    Bayer-patterned color images", ICASSP 2004, doi:10.1109/ICASSP.2004.1326587.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from vcam_cli.processing.base import Block, Pattern, mirrored_index
+from vcam_cli.records import dataclass
 
 REACH = 3
 """Rows and columns that a pixel's colors depend on, each way."""

@@ -24,13 +24,12 @@ References
    demosaicking", IEEE ICIP 2013, doi:10.1109/ICIP.2013.6738475.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from vcam_cli.processing.base import Block, Pattern
 from vcam_cli.processing.edge_aware import FLAT_ROUGHNESS, matching_gain
 from vcam_cli.processing.normalized_convolution import MIN_WEIGHT, Sites, half_width, tent
+from vcam_cli.records import dataclass
 
 MAX_LAG = 4
 """Largest distance of the pixels between which roughness is measured."""

@@ -10,11 +10,11 @@ Why raised and not clipped to the lowest: that would darken all of a picture tha
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from vcam_cli.processing.base import Block, Shading, mirrored_index
+from vcam_cli.records import dataclass
 
 KNEE = 0.95
 """Share of saturation above which a color is raised."""

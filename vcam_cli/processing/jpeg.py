@@ -1,9 +1,10 @@
 """JPEG compression of a render, as a camera's own files have it (ITU-T T.81, by libjpeg)."""
 
-from dataclasses import dataclass
 from io import BytesIO
 
 import numpy as np
+
+from vcam_cli.records import dataclass
 
 
 def compress(codes: np.ndarray, quality: int) -> bytes:

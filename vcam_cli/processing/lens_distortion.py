@@ -1,12 +1,12 @@
 """A picture without the distortion of its lens: pixels are taken from where it imaged them."""
 
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.processing.base import Block, Correction, mirrored_index
+from vcam_cli.records import dataclass
 
 ORDER: Final = 3
 """Of the splines between pixels."""

@@ -4,13 +4,13 @@ The factor is that of the simulated effects themselves, so that nothing but nois
 raises the noise of the corners, and the stray light there, by as much as their light.
 """
 
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.processing.base import Block, Context, Shading, mirrored_index
+from vcam_cli.records import dataclass
 
 WHOLE: Final = slice(None)
 

@@ -4,11 +4,11 @@ It is no step of the user's: whatever `processing` says, its steps mean linear l
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from vcam_cli.processing.base import Block
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

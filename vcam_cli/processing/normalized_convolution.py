@@ -12,12 +12,13 @@ References
 """
 
 from collections.abc import Hashable
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import lru_cache
 
 import numpy as np
 
 from vcam_cli.processing.base import Block, Pattern
+from vcam_cli.records import dataclass
 
 MIN_WEIGHT = 1e-30
 """Less than any weight of a tent."""

@@ -1,7 +1,6 @@
 """The picture after processing: computed on request, block of rows by block of rows."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -12,6 +11,7 @@ from vcam_cli.processing.base import Context, Operation, map_blocks, process_row
 from vcam_cli.processing.check import CANNOT_JUDGE, CANNOT_SHOW
 from vcam_cli.processing.jpeg import Compression
 from vcam_cli.processing.tone_map import ToneMap
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

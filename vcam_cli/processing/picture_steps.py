@@ -15,11 +15,11 @@ References
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from vcam_cli.processing.base import Block, mirrored_index
+from vcam_cli.records import dataclass
 
 WINDOW = 5
 """Pixels along a side of the window of the adaptive filter."""

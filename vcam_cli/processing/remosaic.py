@@ -5,12 +5,11 @@ stay as they are. The others are what guided interpolation (`guided_interpolatio
 color that is wanted, along edges.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from vcam_cli.processing.base import Block, Pattern, mirrored_index
 from vcam_cli.processing.guided_interpolation import GuidedInterpolation
+from vcam_cli.records import dataclass
 
 QUAD: Pattern = (("R", "R", "G", "G"),) * 2 + (("G", "G", "B", "B"),) * 2
 BAYER: Pattern = (("R", "G"), ("G", "B"))

@@ -30,11 +30,10 @@ References
    doi:10.1109/CVPR.1993.341081: a normalized convolution to the first order.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from vcam_cli.processing.base import Layout, map_blocks
+from vcam_cli.records import dataclass
 
 NEIGHBORS = 8
 """Samples of its color that a pixel of the picture is made of."""

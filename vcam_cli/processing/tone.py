@@ -9,10 +9,11 @@ with the next decision level finishes the work. The codes equal those of the for
 precision for EVERY float32, at a fiftieth of its cost.
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+
+from vcam_cli.records import dataclass
 
 Curve = float | str  # a gamma, or "srgb"
 

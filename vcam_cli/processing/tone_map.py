@@ -9,9 +9,9 @@ References
    (2.43 x^2 + 0.59 x + 0.14) to the curve of the Academy Color Encoding System.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
+
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

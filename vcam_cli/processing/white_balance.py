@@ -17,11 +17,10 @@ References
    Franklin Institute 310(1), 1-26, 1980, doi:10.1016/0016-0032(80)90058-7.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from vcam_cli.processing.base import Block, Context, Pattern
+from vcam_cli.records import dataclass
 
 BLACK_FRAME_SHARE = 1e-4
 """Share of white below which all means are those of a black frame."""

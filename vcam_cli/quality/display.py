@@ -14,7 +14,6 @@ References
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cache
 from typing import Literal
 
@@ -23,6 +22,7 @@ from numpy.typing import NDArray
 
 from vcam_cli.camera.quality import Display
 from vcam_cli.errors import BadInput, bad
+from vcam_cli.records import dataclass
 from vcam_cli.spectra import Spectrum, cmf, display_primaries, integral
 
 Primaries = Literal["crt-brainard", "srgb"]

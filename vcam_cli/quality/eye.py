@@ -24,11 +24,12 @@ References
 """
 
 import math
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from vcam_cli.records import dataclass
 
 Filters = Literal["zhang-wandell-1996", "isetcam", "continuous"]
 Gaussian = tuple[float, float]

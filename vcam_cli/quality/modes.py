@@ -15,12 +15,11 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.fft
 
 from vcam_cli.arrays import Array
+from vcam_cli.records import dataclass
 
 MIN_PROMINENCE = 0.01
 """Part of the highest maximum that another must rise above the dip beside it to count."""

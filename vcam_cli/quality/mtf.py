@@ -28,13 +28,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.arrays import Array
 from vcam_cli.floats import rms
+from vcam_cli.records import dataclass
 
 Floats = NDArray[np.floating]
 

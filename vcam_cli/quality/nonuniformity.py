@@ -15,12 +15,12 @@ References
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.arrays import Array
+from vcam_cli.records import dataclass
 
 Floats = NDArray[np.float64]
 

@@ -19,10 +19,11 @@ References
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from vcam_cli.records import dataclass
 
 Floats = NDArray[np.float64]
 

@@ -25,7 +25,6 @@ References
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.fft
@@ -36,6 +35,7 @@ from vcam_cli.parallel import available_workers, each, pieces
 from vcam_cli.quality.cielab import Formula, delta_e, lab
 from vcam_cli.quality.display import Screen
 from vcam_cli.quality.eye import OPPONENT, Filters, kernels
+from vcam_cli.records import dataclass
 
 BLOCK_ROWS = 256
 BLOCK_PLACES = 1 << 21

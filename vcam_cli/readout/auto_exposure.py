@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.electrical import Electrical
 from vcam_cli.camera.exposure import AutoExposure, Exposure
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ so a sensor is the same on every device.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import partial
 from typing import Any
 
@@ -19,6 +19,7 @@ from vcam_cli.devices import counter_noise
 from vcam_cli.devices.processor import Processor
 from vcam_cli.effects.signal_chain import Site
 from vcam_cli.readout.exposure import LAYER
+from vcam_cli.records import dataclass
 from vcam_cli.rng import BLOCK_ROWS, blocks, stream
 
 

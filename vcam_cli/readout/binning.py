@@ -22,13 +22,14 @@ binning", IEEE Trans. Electron Devices 44(10), 1997.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.sensor.array import Binning
+from vcam_cli.records import dataclass
 
 Block = tuple[tuple[str, ...], ...]
 

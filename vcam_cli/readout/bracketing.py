@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from vcam_cli.parallel import each
 from vcam_cli.physics import merging
 from vcam_cli.readout.chain import ReadoutChain
 from vcam_cli.readout.exposure import mean_dark
+from vcam_cli.records import dataclass
 from vcam_cli.rng import blocks
 
 LEVELS = 100

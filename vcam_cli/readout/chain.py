@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Protocol, Self
 
@@ -26,6 +26,7 @@ from vcam_cli.effects.pixel_signal import Transport
 from vcam_cli.effects.signal_chain import NoiseSource, Quantizer, electron_effects, noise_sources
 from vcam_cli.readout.binned_readout import effects_in_readout
 from vcam_cli.readout.binning import BinningGroups
+from vcam_cli.records import dataclass
 
 SURE = 3
 """Standard deviations of noise behind full wells by which a full pixel may read less than they

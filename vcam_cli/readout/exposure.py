@@ -8,7 +8,7 @@ not depend on the number of workers.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 
 import numpy as np
@@ -24,6 +24,7 @@ from vcam_cli.effects.signal_chain import (
     electron_effects,
 )
 from vcam_cli.parallel import each, slices_within
+from vcam_cli.records import dataclass
 from vcam_cli.rng import (
     BLOCK_ROWS,
     KEPT_PIXELS,

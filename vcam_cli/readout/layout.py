@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
@@ -21,6 +21,7 @@ from vcam_cli.camera.derived.lattice import Places
 from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.readout.binning import ALONE, BinningGroups
+from vcam_cli.records import dataclass
 
 REACH = 8
 """Points a side of the polynomial between a lattice's points."""

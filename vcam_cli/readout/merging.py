@@ -8,7 +8,6 @@ pattern: only what is new in each readout decides between them. Photodiodes shar
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
@@ -16,6 +15,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.physics import merging
 from vcam_cli.readout.chain import ReadoutChain
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from vcam_cli.readout.exposure import (
     runs_of_rows,
     sites,
 )
+from vcam_cli.records import dataclass
 
 Sites = dict[str, Site]
 

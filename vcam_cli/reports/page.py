@@ -8,11 +8,12 @@ its head forbids it to load anything. Without scripts nothing is missing but the
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import ClassVar
 
 from vcam_cli.files import atomic
+from vcam_cli.records import dataclass
 
 MARK = '<meta name="generator" content="vcam">'
 """By this a file is known for a report."""

@@ -12,7 +12,7 @@ in closed form and stay exact, all else is samples.
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import ClassVar, Literal, Protocol, runtime_checkable
 
@@ -21,6 +21,7 @@ from numpy.typing import DTypeLike
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.bands import bands_of_rows, paint_by_bands
 from vcam_cli.scenes.blur_change import BlurLoss, ChangeBounds, profile_bounds, rectangle_bounds
 from vcam_cli.scenes.cells import Spans, cell_edges, edges_within, extremes_within

@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -27,6 +26,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.cache import ByteCache, remembered
 from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.closed_form import Profile
 
 

@@ -1,13 +1,14 @@
 """From layers as the camera file has them to layers on the sensor plane."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.scene.scene import Scene as SceneModel
 from vcam_cli.camera.scene.scene_files import ImageFile
+from vcam_cli.records import dataclass
 from vcam_cli.scenes import light
 from vcam_cli.scenes.base import Chart, Frame, View
 from vcam_cli.scenes.build import chart_and_reflectances, picture_spectra

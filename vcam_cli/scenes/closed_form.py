@@ -1,9 +1,10 @@
 """Light that is known in closed form: even between edges, in discs, or a sum of products."""
 
-from dataclasses import dataclass
 from typing import Any
 
 from numpy.typing import NDArray
+
+from vcam_cli.records import dataclass
 
 Array = NDArray[Any]
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.fft
 
 from vcam_cli.arrays import Array
+from vcam_cli.records import dataclass
 
 BINS = 256
 """Frequencies of a power spectrum."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.base import SampledScene, View
 from vcam_cli.scenes.depth_cut import DepthCut, cut_depth, is_flat
 from vcam_cli.scenes.depth_detail import Detail, full_signal, picture_detail

@@ -8,11 +8,12 @@ cells are divided is chosen by it (`divisions`).
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.records import dataclass
 
 MOST = 5
 """Divisions of a cell that several edges cross, at most."""

@@ -9,7 +9,6 @@ of planes costs one painting.
 
 import hashlib
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Protocol, TypeVar, cast
 
@@ -17,6 +16,7 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.cache import ByteCache
+from vcam_cli.records import dataclass
 from vcam_cli.scenes import disc_edges
 from vcam_cli.scenes.disc_edges import CrossedCells, Discs
 from vcam_cli.scenes.runs import concatenate_ranges, expand_ranges, topmost_numbers

@@ -1,10 +1,11 @@
 """Charts on a view's cells, whole or as a picture in a frame."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.base import Chart, ChartScene, Frame, View
 from vcam_cli.scenes.cells import clip_cells, edges_within
 from vcam_cli.scenes.closed_form import LightDisc, Products

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -32,6 +32,7 @@ from vcam_cli.camera.scene.illuminant import IlluminantSpec
 from vcam_cli.camera.scene.scene import Scene
 from vcam_cli.errors import bad
 from vcam_cli.parallel import each, pieces
+from vcam_cli.records import dataclass
 from vcam_cli.scenes import light
 from vcam_cli.scenes.base import View
 from vcam_cli.scenes.image import ImageScene, image_scene

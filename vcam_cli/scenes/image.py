@@ -8,7 +8,7 @@ samples around it until array and margin are covered.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Self
 
@@ -16,6 +16,7 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.bands import paint_by_bands
 from vcam_cli.scenes.base import SampledScene, View
 from vcam_cli.scenes.blur_change import BlurLoss, ChangeBounds, squares_factor

@@ -7,12 +7,13 @@ distance, by image formation; `flat` is the scene as a pinhole sees it.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.parallel import pieces
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.base import Chart, ChartScene, Frame, PaintedCells, Scene, View
 from vcam_cli.scenes.cells import Spans, means_of_parts, window_extremes
 from vcam_cli.scenes.closed_form import Profile

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.base import Chart, ChartScene, Harmonics, HarmonicScene, Scene
 from vcam_cli.scenes.closed_form import LightDisc, Products, Profile
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region

@@ -1,7 +1,7 @@
 """A picture as a chart: its averages over cells of any size, at any place."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.parallel import pieces, product, rows_at_once
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.base import SPARSE, Chart, Frame, PaintedCells
 from vcam_cli.scenes.cells import clip_cells
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, counted_height

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
@@ -19,6 +19,7 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.parallel import pieces, product
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.base import SPARSE, Chart, PaintedCells
 from vcam_cli.scenes.cells import cell_means
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region

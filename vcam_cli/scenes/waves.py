@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.blur_change import BlurLoss, ChangeBounds
 from vcam_cli.scenes.closed_form import Products
 from vcam_cli.spectra import Spectrum

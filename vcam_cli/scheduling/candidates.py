@@ -3,10 +3,9 @@
 x = well / t is the rate, photocurrent and dark current together, that fills the well at t.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from vcam_cli.records import dataclass
 from vcam_cli.scheduling.pdf import Floats, Pdf
 from vcam_cli.scheduling.sensor import SLACK, Constraints, Sensor, first_capture_time
 

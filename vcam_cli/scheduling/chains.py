@@ -28,10 +28,10 @@ References
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
+from vcam_cli.records import dataclass
 from vcam_cli.scheduling.objective import TINY, mean_snr_rate, saturation_limits, split_segments
 from vcam_cli.scheduling.pdf import Floats, Indices, Pdf
 from vcam_cli.scheduling.sensor import SLACK, Constraints, Sensor

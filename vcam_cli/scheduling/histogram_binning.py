@@ -22,13 +22,13 @@ References
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from vcam_cli.arrays import Array
+from vcam_cli.records import dataclass
 from vcam_cli.scheduling.pdf import Floats, Indices, Pdf
 
 Histogram = tuple[ArrayLike, ArrayLike]

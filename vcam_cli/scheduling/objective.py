@@ -20,11 +20,10 @@ References
    University, 2003.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vcam_cli.records import dataclass
 from vcam_cli.scheduling.pdf import Floats, Pdf
 from vcam_cli.scheduling.sensor import SHOT_NOISE, SLACK, Sensor
 

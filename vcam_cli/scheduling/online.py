@@ -18,11 +18,10 @@ References
    University, 2003.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.records import dataclass
 from vcam_cli.scheduling import full_noise
 from vcam_cli.scheduling.pdf import Floats, Pdf, photocurrent_levels
 from vcam_cli.scheduling.sensor import UNCONSTRAINED, Constraints, Sensor

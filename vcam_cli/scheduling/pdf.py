@@ -14,13 +14,13 @@ References
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vcam_cli.arrays import Array
+from vcam_cli.records import dataclass
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -1,10 +1,9 @@
 """The pixel that captures are planned for, and what its readout demands of capture times."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vcam_cli.records import dataclass
 from vcam_cli.scheduling.pdf import Floats, Pdf
 
 SLACK = 1e-12

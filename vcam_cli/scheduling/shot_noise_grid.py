@@ -32,11 +32,11 @@ by sweeps alone, a histogram of 4096 bins 0.14 s against 0.50 s, and 0.22 s with
 """
 
 from bisect import bisect_left
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcam_cli.records import dataclass
 from vcam_cli.scheduling.pdf import Floats, Indices, Pdf
 
 COARSEST = 0.01

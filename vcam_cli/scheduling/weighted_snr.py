@@ -18,12 +18,12 @@ References
    captures", IEEE Trans. Circuits Syst. I 50(4), 2003, doi:10.1109/TCSI.2003.809815.
 """
 
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcam_cli.records import dataclass
 from vcam_cli.scheduling import objective
 from vcam_cli.scheduling.objective import TINY, sorted_times
 from vcam_cli.scheduling.pdf import Floats, Indices, Pdf

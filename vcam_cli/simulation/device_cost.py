@@ -5,13 +5,14 @@ The constants are of one measured card: no device has to be there to estimate it
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.signal_chain import ElectronEffect, Quantizer
 from vcam_cli.image_formation.estimates.light_cost import filter_work
 from vcam_cli.image_formation.optical_path import SpectrumReport
+from vcam_cli.records import dataclass
 from vcam_cli.simulation.cost_model import slowness, threads
 from vcam_cli.simulation.preparation import Prepared
 

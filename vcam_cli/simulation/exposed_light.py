@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -22,6 +22,7 @@ from vcam_cli.image_formation.neighbor_sharing import Sharing, array_sharing
 from vcam_cli.readout import auto_exposure, exposure, sample_times
 from vcam_cli.readout.binning import BinningGroups
 from vcam_cli.readout.layout import Layout
+from vcam_cli.records import dataclass
 from vcam_cli.simulation.scene_light import (
     MOST_ELECTRONS,
     SceneLight,

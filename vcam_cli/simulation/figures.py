@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.effects.signal_chain import NoiseSource
 from vcam_cli.physics import readout
 from vcam_cli.processing.tone_map import sensor_white
+from vcam_cli.records import dataclass
 from vcam_cli.simulation.frame import Frame
 from vcam_cli.simulation.pixel_figures import pixel_figures
 

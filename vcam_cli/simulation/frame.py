@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -22,6 +22,7 @@ from vcam_cli.image_formation.pixel_response import axis_levels
 from vcam_cli.progress import Stages
 from vcam_cli.readout import binned_readout, exposure
 from vcam_cli.readout.layout import Layout
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.layered import LayeredScene
 from vcam_cli.simulation.preparation import Prepared

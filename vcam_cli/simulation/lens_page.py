@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from vcam_cli.errors import bad
 from vcam_cli.lenses.analysis import Drawing, Spots, drawing, ideal_ratio, spots
 from vcam_cli.lenses.fields import View
 from vcam_cli.lenses.paraxial import paraxial
+from vcam_cli.records import dataclass
 from vcam_cli.solve.solved import Solved
 
 PLACES = 9

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -18,6 +17,7 @@ from vcam_cli.processing import ProcessedPicture
 from vcam_cli.progress import Stages
 from vcam_cli.quality.metrics import Metrics
 from vcam_cli.quality.mse import mse, psnr_db
+from vcam_cli.records import dataclass
 from vcam_cli.simulation.figures import figures
 from vcam_cli.simulation.frame import Frame
 from vcam_cli.solve.solved import Solved

@@ -6,13 +6,12 @@ University, 2003, section 3.2.1.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from vcam_cli.effects.signal_chain import NoiseSource, noise_sources
 from vcam_cli.physics import readout
 from vcam_cli.readout.exposure import mean_dark
+from vcam_cli.records import dataclass
 from vcam_cli.solve.solved import Solved
 
 SHARE = 0.2

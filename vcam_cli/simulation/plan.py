@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, field, replace
 from functools import cached_property
 from itertools import chain, combinations
 from typing import Any
@@ -40,6 +40,7 @@ from vcam_cli.effects.signal_chain import (
 )
 from vcam_cli.image_formation.light_plan import OMITTED_SHARE, LightPlan
 from vcam_cli.image_formation.settings import Settings
+from vcam_cli.records import dataclass
 from vcam_cli.solve.effects import CameraEffects
 
 VARIANCE_SHARE = 0.8

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.frame_rate import FrameRate
 from vcam_cli.progress import Observer
+from vcam_cli.records import dataclass
 from vcam_cli.simulation.device_cost import DeviceCost, device_cost
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.remarks import Notes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
@@ -27,6 +27,7 @@ from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.readout import exposure
 from vcam_cli.readout.chain import ReadoutChain
 from vcam_cli.readout.layout import Layout
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.layered import AnyScene
 from vcam_cli.simulation import cost_model, plan
 from vcam_cli.simulation.exposed_light import ExposedLight

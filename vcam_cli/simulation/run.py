@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from vcam_cli.devices.processor import PROCESSOR, Processor
 from vcam_cli.image_formation.rate_cache import RateCache
 from vcam_cli.progress import Stages
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

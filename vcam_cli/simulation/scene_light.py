@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -21,6 +21,7 @@ from vcam_cli.image_formation.pixel_response import scene_transfer
 from vcam_cli.image_formation.rate_cache import RateCache
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.readout import auto_exposure, exposure
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.base import ChartScene, HarmonicScene, SampledScene
 from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.image import ImageScene

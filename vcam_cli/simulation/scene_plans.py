@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from vcam_cli.effects.order import ORDER
 from vcam_cli.progress import Observer, Silent
+from vcam_cli.records import dataclass
 from vcam_cli.simulation.checks import load
 from vcam_cli.simulation.plan import Decision, Plan
 from vcam_cli.simulation.scene_times import SceneTimes, measure

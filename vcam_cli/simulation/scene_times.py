@@ -11,9 +11,9 @@ import statistics
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 
 from vcam_cli.camera.camera import Camera
+from vcam_cli.records import dataclass
 from vcam_cli.simulation.plan import Decision
 from vcam_cli.simulation.shared import Shared
 from vcam_cli.simulation.simulate import Result, simulate

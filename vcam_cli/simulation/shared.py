@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from threading import Lock
 from typing import Any
@@ -12,6 +12,7 @@ from typing import Any
 from vcam_cli.cache import ByteCache
 from vcam_cli.camera.camera import Camera
 from vcam_cli.image_formation.rate_cache import RateCache
+from vcam_cli.records import dataclass
 from vcam_cli.simulation.output.provenance import data_files
 from vcam_cli.simulation.scene_files import scene_bytes
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 
 from vcam_cli.camera.camera import Camera
@@ -14,6 +13,7 @@ from vcam_cli.effects.order import ORDER
 from vcam_cli.effects.pixel_signal import Charge, Overflow
 from vcam_cli.effects.signal_chain import NoiseSource, Quantizer
 from vcam_cli.errors import Collector
+from vcam_cli.records import dataclass
 from vcam_cli.solve.merge import camera_merge
 from vcam_cli.solve.merged_noise import merged_effects
 

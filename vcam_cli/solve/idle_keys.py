@@ -8,7 +8,6 @@ not reached, is no matter of the file and not reported here.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,7 @@ from vcam_cli.camera.sensor.photodetector import AtTemperature
 from vcam_cli.config.model import Model
 from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.errors import BadInput
+from vcam_cli.records import dataclass
 from vcam_cli.spectra import Spectrum
 
 PROBES = (2.0, 0.5, 1.1, 0.9)

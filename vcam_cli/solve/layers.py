@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry, geometry
 from vcam_cli.camera.scene.scene import Scene
 from vcam_cli.effects.base import Effect
+from vcam_cli.records import dataclass
 from vcam_cli.solve.effects import camera_effects
 
 

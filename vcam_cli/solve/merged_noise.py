@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from itertools import groupby
 
 from vcam_cli.arrays import Array
@@ -12,6 +11,7 @@ from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.signal_chain import NoiseSource, Site
 from vcam_cli.readout.merging import Merge
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

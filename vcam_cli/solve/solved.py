@@ -7,7 +7,7 @@ return cameras with other values, to meter or to focus.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, Self
 
@@ -40,6 +40,7 @@ from vcam_cli.image_formation.pixel_response import PixelResponse
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.readout.chain import ReadoutChain
 from vcam_cli.readout.layout import Layout
+from vcam_cli.records import dataclass
 from vcam_cli.solve import idle_keys, iso_speed, light_key
 from vcam_cli.solve.chain import readout_chain
 from vcam_cli.solve.effects import CameraEffects, camera_effects

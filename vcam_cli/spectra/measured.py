@@ -7,12 +7,12 @@ light has wavelengths of hundreds of nanometers, or around one micrometer.
 """
 
 import re
-from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
 import numpy as np
 
+from vcam_cli.records import dataclass
 from vcam_cli.spectra.spectrum import Floats, Outside, Table
 from vcam_cli.spectra.text import MAX_ROWS, parse_numbers, read_lines
 

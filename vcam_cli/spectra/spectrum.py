@@ -5,11 +5,13 @@ efficiency) is the caller's: a product of spectra has the product of their units
 """
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from vcam_cli.records import dataclass
 
 Floats = NDArray[np.float64]
 Outside = Literal["error", "zero", "hold"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, overload
@@ -14,6 +14,7 @@ from vcam_cli.files.plots import in_formats
 from vcam_cli.files.points_store import SweepFolder
 from vcam_cli.files.report import hash_file
 from vcam_cli.progress import Observer
+from vcam_cli.records import dataclass
 from vcam_cli.simulation.output import provenance
 from vcam_cli.sweeps import (
     expectations,

@@ -6,7 +6,7 @@ by the figures of a sweep.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from vcam_cli.camera.scene.charts import Csf
 from vcam_cli.processing.tone import codes
 from vcam_cli.quality import error_map, iso_lines
 from vcam_cli.quality.modes import density, density_modes
+from vcam_cli.records import dataclass
 from vcam_cli.simulation.shared import Shared
 from vcam_cli.simulation.simulate import simulate
 from vcam_cli.sweeps.plots import Curve, FigureContent, Panel

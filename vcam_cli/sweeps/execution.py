@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from urllib.parse import urlsplit
 
 from vcam_cli.errors import bad
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -10,13 +10,13 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from vcam_cli import units
 from vcam_cli.config.validation_messages import one_of
 from vcam_cli.errors import BadInput, Collector
 from vcam_cli.files.tables import Cell, write_table
+from vcam_cli.records import dataclass
 from vcam_cli.sweeps import properties, quantities
 from vcam_cli.sweeps.model import OPTIMUM, Expectation
 from vcam_cli.sweeps.study_cameras import StudyCameras

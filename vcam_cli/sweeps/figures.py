@@ -8,7 +8,7 @@ other shares there are none, and those of a former study go.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -17,6 +17,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.errors import BadInput, Collector, VcamError, bad, one_line
 from vcam_cli.files.tables import write_table
 from vcam_cli.progress import Observer
+from vcam_cli.records import dataclass
 from vcam_cli.sweeps import error_maps, plots, properties, quantities
 from vcam_cli.sweeps.error_maps import MapCache
 from vcam_cli.sweeps.figure_model import Figure

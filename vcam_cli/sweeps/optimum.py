@@ -24,11 +24,12 @@ sections 6.2 and 13.3.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.records import dataclass
 
 DRAWS = 1000
 """Number of means of curves that are drawn."""

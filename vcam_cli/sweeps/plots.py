@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.files.plots import COLORS, DASHES, MARK, MARKERS, SMALL, SMALLEST, plot_figure
 from vcam_cli.files.tables import Cell
+from vcam_cli.records import dataclass
 from vcam_cli.sweeps.sweep_result import CaseOptimum
 
 SIZES = {1: (6.4, 4.2), 2: (9.6, 3.9), 3: (12.6, 3.7)}

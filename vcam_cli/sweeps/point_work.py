@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 from vcam_cli.camera.camera import Camera
@@ -15,6 +14,7 @@ from vcam_cli.files.images.png import write_png
 from vcam_cli.floats import own_float_errors
 from vcam_cli.interrupts import restore_interrupt
 from vcam_cli.parallel import available_workers
+from vcam_cli.records import dataclass
 from vcam_cli.simulation.output import outputs
 from vcam_cli.simulation.output.provenance import versions
 from vcam_cli.simulation.shared import Shared

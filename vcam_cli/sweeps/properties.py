@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -31,6 +30,7 @@ from vcam_cli.errors import bad
 from vcam_cli.image_formation.neighbor_sharing import array_sharing
 from vcam_cli.image_formation.pixel_response import scene_transfer
 from vcam_cli.physics import readout, vignetting
+from vcam_cli.records import dataclass
 from vcam_cli.scenes import light
 from vcam_cli.simulation.pixel_figures import pixel_figures
 from vcam_cli.solve.effects import camera_effects

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from vcam_cli.camera import load
@@ -17,6 +17,7 @@ from vcam_cli.config.file_names import current_folder
 from vcam_cli.config.validation_messages import one_of
 from vcam_cli.config.yaml_tree import Node, tree_at
 from vcam_cli.errors import BadInput, split
+from vcam_cli.records import dataclass
 from vcam_cli.simulation.checks import CHECKS
 from vcam_cli.sweeps.figure_model import Figure
 from vcam_cli.sweeps.quantities import is_measured

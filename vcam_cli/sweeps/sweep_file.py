@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -31,6 +31,7 @@ from vcam_cli.config.validation_messages import yaml_text
 from vcam_cli.config.yaml_reader import read_file
 from vcam_cli.config.yaml_tree import Node, Origin, PlacedKeys, Source, tree_at
 from vcam_cli.errors import BadInput, Problem, split
+from vcam_cli.records import dataclass
 from vcam_cli.sweeps import study_hints
 from vcam_cli.sweeps.model import VARY, Sweep, Variation
 from vcam_cli.sweeps.quantities import QUALITY, symbol

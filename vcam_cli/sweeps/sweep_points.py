@@ -14,7 +14,7 @@ from __future__ import annotations
 import itertools
 import json
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -34,6 +34,7 @@ from vcam_cli.config.validation_messages import NO_SUCH_KEY
 from vcam_cli.config.yaml_tree import Node, Source, tree_at
 from vcam_cli.errors import BadInput, Problem, split
 from vcam_cli.files.report import hash_file, hash_text, to_json
+from vcam_cli.records import dataclass
 from vcam_cli.simulation.checks import CHECKS
 from vcam_cli.simulation.output import provenance
 from vcam_cli.solve.light_key import light_key

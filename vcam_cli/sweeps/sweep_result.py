@@ -11,7 +11,7 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, field
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ from vcam_cli.files.records import Proofs, read_record, record_check
 from vcam_cli.files.report import hash_file, hash_text, to_json
 from vcam_cli.files.spectral.hyperspectral import companions
 from vcam_cli.files.tables import Cell
+from vcam_cli.records import dataclass
 from vcam_cli.simulation.output import provenance
 from vcam_cli.sweeps.model import Basis
 from vcam_cli.sweeps.sweep_file import StudyFile

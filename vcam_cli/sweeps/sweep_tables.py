@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
 
@@ -12,6 +11,7 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.files.tables import Cell, write_table
+from vcam_cli.records import dataclass
 from vcam_cli.sweeps.joint_optimum import MIN_POINTS, find_joint_optimum
 from vcam_cli.sweeps.model import Optimize
 from vcam_cli.sweeps.optimum import Optimum, find_optimum

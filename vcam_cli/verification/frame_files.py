@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import itertools
 import re
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +20,7 @@ from vcam_cli.files.file_checks import UnusableFile, check_file, check_regular, 
 from vcam_cli.files.images.camera_raw import read_codes
 from vcam_cli.files.images.exr import read_exr
 from vcam_cli.files.images.images import check_size, open_image, read_samples
+from vcam_cli.records import dataclass
 
 MOST_PIXELS = 500_000_000
 """Of a frame; the largest sensors have 400 million pixels."""

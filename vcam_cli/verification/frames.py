@@ -7,7 +7,7 @@ import hashlib
 import itertools
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.mosaic import BLOCKS
 from vcam_cli.errors import BadInput, Collector, bad
 from vcam_cli.files.file_checks import UnusableFile
+from vcam_cli.records import dataclass
 from vcam_cli.verification.frame_files import Page, pages, read_page
 from vcam_cli.verification.frame_sets import FrameSet
 from vcam_cli.verification.model import Measurement

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from vcam_cli.arrays import Array
@@ -12,6 +10,7 @@ from vcam_cli.camera.derived.lattice import places
 from vcam_cli.camera.derived.readouts import has_several
 from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.errors import Collector
+from vcam_cli.records import dataclass
 from vcam_cli.verification import stack_quantities
 from vcam_cli.verification.frame_sets import FrameSet
 from vcam_cli.verification.frames import (

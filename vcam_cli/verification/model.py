@@ -1,7 +1,6 @@
 """A measurement file: what was measured, and under which conditions."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import model_validator
@@ -15,6 +14,7 @@ from vcam_cli.config.quantities import Number, Percentage, Quantity
 from vcam_cli.config.validation_messages import describe, fault, refusal
 from vcam_cli.config.values import TIME, Either, MaybeSiliconTemperature, Text, Word, mapping
 from vcam_cli.config.yaml_type import YamlType, to_yaml
+from vcam_cli.records import dataclass
 from vcam_cli.verification.frame_sets import PATTERNS, FrameSet, Levels, MeasuredLens, MeasuredPixel
 from vcam_cli.verification.light import Light
 

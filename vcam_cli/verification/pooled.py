@@ -9,10 +9,10 @@ its deviations from the others, including errors shared by frames of one sensor.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
+from vcam_cli.records import dataclass
 from vcam_cli.verification.stack_prediction import Judged
 
 SURE = 1.30

@@ -17,13 +17,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.simulation import Seed
+from vcam_cli.records import dataclass
 from vcam_cli.simulation.frame import take_frame
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.simulate import prepare

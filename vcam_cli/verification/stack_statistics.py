@@ -9,13 +9,14 @@ the variances do not depend on how many frames and pixels there are.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.quality import rounding
 from vcam_cli.quality.photon_transfer import ROUNDING
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 from typing import Any
 
@@ -15,6 +15,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.errors import BadInput, Collector
 from vcam_cli.floats import rms
 from vcam_cli.progress import Observer, Silent
+from vcam_cli.records import dataclass
 from vcam_cli.verification.edges import judge_edge
 from vcam_cli.verification.frames import numbered_stacks, paths, raise_if_any
 from vcam_cli.verification.measured_points import Points, measured_points, quantities_of_colors

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.errors import bad, data_file_problems
+from vcam_cli.records import dataclass
 from vcam_cli.spectra.text import parse_numbers, read_table
 
 PATH = ("scene", "camera_motion", "file")

@@ -6,7 +6,7 @@ noise in front of the ADC, which effects know: `effects/readout_chain.py`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived import sense_node
@@ -19,6 +19,7 @@ from vcam_cli.camera.sensor.architecture import ARCHITECTURES
 from vcam_cli.camera.sensor.pixel import AGREE
 from vcam_cli.errors import BadInput, bad
 from vcam_cli.physics import readout
+from vcam_cli.records import dataclass
 
 NOMINAL_SWING = 1.0
 """Volts of a full well where the file gives no voltage; nothing that is counted depends on it."""

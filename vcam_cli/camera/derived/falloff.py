@@ -1,7 +1,5 @@
 """A lens's measured relative illumination, read from its file."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from vcam_cli.camera.derived.geometry import Geometry, geometry
@@ -9,6 +7,7 @@ from vcam_cli.camera.derived.traced import traced_view
 from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.optics import FalloffFile
 from vcam_cli.errors import Path, bad, data_file_problems
+from vcam_cli.records import dataclass
 from vcam_cli.spectra.text import read_rows
 
 HEADER = ("image_height_mm", "value")

@@ -18,14 +18,13 @@ section 1.2.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from vcam_cli.camera.derived.lattice import lattice
 from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES, article
 from vcam_cli.camera.sensor.pixel import ChargeTransfer, Timing
 from vcam_cli.errors import bad
 from vcam_cli.physics.transfer_time import transfer_time
+from vcam_cli.records import dataclass
 
 PATH = "pixel.readout.timing"
 

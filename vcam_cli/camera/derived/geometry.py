@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import operator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -29,6 +28,7 @@ from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.scene.scene import Extent
 from vcam_cli.errors import Collector, bad
 from vcam_cli.physics import depth_of_field, diffraction, radiometry
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from vcam_cli.camera.derived.geometry import geometry as solve
 from vcam_cli.camera.derived.line_times import LineTimes, line_times
 from vcam_cli.errors import bad
 from vcam_cli.physics.motion_blur import turned_back
+from vcam_cli.records import dataclass
 
 SCENE, CAMERA = ("scene", "source", "motion"), ("scene", "camera_motion")
 

@@ -7,14 +7,13 @@ its surface dark, and all of the layer below it is depleted (`charge_storage`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from vcam_cli.camera.derived.charge_storage import gate_well, pinned_layer
 from vcam_cli.camera.derived.process import Need, Process, process
 from vcam_cli.camera.derived.sense_node import area_capacitance
 from vcam_cli.camera.model import CameraModel
 from vcam_cli.errors import bad
 from vcam_cli.physics import junction
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

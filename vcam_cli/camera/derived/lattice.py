@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
@@ -20,6 +19,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.sensor.array import CLEAR, Positions
 from vcam_cli.errors import bad, data_file_problems
+from vcam_cli.records import dataclass
 from vcam_cli.spectra.text import parse_numbers, read_table
 
 PATH = ("array", "pattern", "positions")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from vcam_cli.camera.optics import LEAST_F_NUMBER, MOST_F_NUMBER, Optics
 from vcam_cli.camera.sensor.pixel import AGREE
 from vcam_cli.errors import bad
 from vcam_cli.physics import radiometry
+from vcam_cli.records import dataclass
 
 _GIVE_TWO = "give two of f_number, focal_length and aperture_diameter"
 

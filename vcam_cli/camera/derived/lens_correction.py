@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +12,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.lens_mapping import border, lens_mapping
 from vcam_cli.physics.distortion import Mapping
+from vcam_cli.records import dataclass
 
 STEP = "lens_distortion"
 WIDER = 4

@@ -1,7 +1,5 @@
 """A lens's measured modulation transfer, read from its file."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from vcam_cli.arrays import Array
@@ -9,6 +7,7 @@ from vcam_cli.camera.derived.geometry import Geometry, geometry
 from vcam_cli.camera.model import CameraModel
 from vcam_cli.errors import bad, data_file_problems
 from vcam_cli.physics import diffraction
+from vcam_cli.records import dataclass
 from vcam_cli.spectra.text import read_rows
 
 FREQUENCY, VALUE = "frequency_lp_per_mm", "value"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from vcam_cli.arrays import Array
@@ -11,6 +9,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.sensor.array import Positions
 from vcam_cli.errors import bad
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

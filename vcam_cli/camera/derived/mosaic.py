@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.sensor.array import Block
+from vcam_cli.records import dataclass
 
 NONE = "."
 """A place of a block where there is no pixel."""

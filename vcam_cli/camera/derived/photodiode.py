@@ -11,8 +11,6 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from vcam_cli.camera.derived.dark_current import DOUBLING, dark_rate, junction_parts
@@ -24,6 +22,7 @@ from vcam_cli.camera.sensor.photodetector import ChargeDiffusion
 from vcam_cli.errors import Collector, split
 from vcam_cli.physics import photodiode as physics
 from vcam_cli.physics import silicon
+from vcam_cli.records import dataclass
 from vcam_cli.spectra import Spectrum
 
 ABSORPTION_TEMPERATURE = 300.0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.sensor.pixel import Microlens
 from vcam_cli.errors import BadInput, bad
 from vcam_cli.physics import photodiode, vignetting
+from vcam_cli.records import dataclass
 
 MOST_COLLECTED = 0.95
 """Share of a pixel's area whose light a microlens collects at most."""

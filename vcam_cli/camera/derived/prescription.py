@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from vcam_cli.lenses.paraxial import Paraxial
 from vcam_cli.lenses.prescription import Prescription
 from vcam_cli.lenses.pupils import pupils
 from vcam_cli.lenses.wavefronts import FieldWavefronts, NoImage, trace_field
+from vcam_cli.records import dataclass
 
 PATH = ("optics", "prescription")
 FALLOFF_HEIGHTS = 25

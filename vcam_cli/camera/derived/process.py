@@ -12,7 +12,6 @@ ITRS 1999 expects supply and dimensions to go from 0.35 to 0.13 um. See `EXPONEN
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
 from typing import Any, TypeVar, get_args
 
@@ -32,6 +31,7 @@ from vcam_cli.camera.sensor.technology import (
 )
 from vcam_cli.config.model import Model
 from vcam_cli.errors import bad
+from vcam_cli.records import dataclass
 
 EXPONENTS = {
     "lengths": 1.0,  # what constant-field scaling means; gate oxides follow the gate's length

@@ -6,7 +6,6 @@ and codes holds for each of them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from vcam_cli.camera.camera import Camera
@@ -15,6 +14,7 @@ from vcam_cli.camera.sensor.architecture import ARCHITECTURES
 from vcam_cli.camera.sensor.photodetector import DarkCurrent
 from vcam_cli.camera.sensor.several_readouts import SmallPhotodiode
 from vcam_cli.errors import bad
+from vcam_cli.records import dataclass
 
 GAINS, SMALL = "pixel.readout.gains", "pixel.readout.small"
 LARGE_PHOTODIODE, SMALL_PHOTODIODE = 0, 1

@@ -12,8 +12,6 @@ section 2.4.1 and Fig 2.18.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,6 +22,7 @@ from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.sensor.transfer_curve import Follower, Points
 from vcam_cli.errors import bad, data_file_problems
 from vcam_cli.physics import follower as physics
+from vcam_cli.records import dataclass
 from vcam_cli.spectra.text import read_rows
 
 POINTS = 1025

@@ -1,7 +1,7 @@
 """Lamps as a camera file writes them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, Any
 
 from vcam_cli import spectra
@@ -12,6 +12,7 @@ from vcam_cli.config.validation_messages import describe
 from vcam_cli.config.values import Angle, Percent, Temperature, Wavelength, mapping
 from vcam_cli.config.yaml_type import DEFINED, YamlType, to_yaml
 from vcam_cli.errors import Path, bad
+from vcam_cli.records import dataclass
 from vcam_cli.spectra.spectrum import Outside
 
 _FORMS = (

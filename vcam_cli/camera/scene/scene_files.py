@@ -1,7 +1,6 @@
 """Scenes that are files: pictures, and spectra at every place."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Annotated, Any, Literal, Self
 
@@ -22,6 +21,7 @@ from vcam_cli.config.values import (
     mapping,
 )
 from vcam_cli.config.yaml_type import YamlType
+from vcam_cli.records import dataclass
 
 
 class DepthMap(Model):

@@ -24,8 +24,9 @@ image sensors", IEEE Circuits and Devices 21(3), 2005, doi:10.1109/MCD.2005.1438
 "Scientific Charge-Coupled Devices", SPIE, 2001, doi:10.1117/3.374903, chapters 5 and 6.
 """
 
-from dataclasses import dataclass
 from typing import Literal
+
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

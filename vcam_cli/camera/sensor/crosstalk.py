@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 from vcam_cli.config.lists import read_items
@@ -10,6 +9,7 @@ from vcam_cli.config.model import Model, key
 from vcam_cli.config.quantities import Number, Percentage
 from vcam_cli.config.validation_messages import describe
 from vcam_cli.config.yaml_type import YamlType
+from vcam_cli.records import dataclass
 
 Kernel = tuple[tuple[float, ...], ...]
 """Shares of a pixel's signal by row and column, its own in the center; their sum is 1."""

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import model_validator
@@ -13,6 +12,7 @@ from vcam_cli.config.quantities import Number, Quantity, Whole
 from vcam_cli.config.validation_messages import describe, refusal
 from vcam_cli.config.values import MOST_ELECTRONS, Electrons, Percent
 from vcam_cli.config.yaml_type import YamlType
+from vcam_cli.records import dataclass
 
 _ONE_NOISE = Quantity("charge", least=0, most=MOST_ELECTRONS)
 _NOISE_AT_GAIN = Quantity("charge", above=0, most=MOST_ELECTRONS)

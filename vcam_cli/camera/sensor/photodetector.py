@@ -1,7 +1,7 @@
 """The photodetector: size, quantum efficiency, dark current, capacitance, junction."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 from vcam_cli.camera.sensor.technology import DOUBLING, Junction
@@ -16,6 +16,7 @@ from vcam_cli.config.values import (
     MaybeSiliconTemperature,
     word_or,
 )
+from vcam_cli.records import dataclass
 from vcam_cli.spectra.spectrum import Outside
 
 _EFFICIENCY = Spectral(most=1.0)

@@ -7,7 +7,6 @@ n is the noise in codes, K the codes of an electron at the exposure's gain and t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
 from vcam_cli.arrays import Array
@@ -15,6 +14,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.noise.quantization import Quantization
 from vcam_cli.effects.signal_chain import NoiseSource, Quantizer, Site
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

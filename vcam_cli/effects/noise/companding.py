@@ -8,14 +8,13 @@ A step of a segment is dx / dy codes of the ADC wide, and rounding there has the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.signal_chain import Quantizer
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

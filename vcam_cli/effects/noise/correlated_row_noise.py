@@ -7,7 +7,7 @@ is the noise of row k over its rms, r the correlation of neighbors, z normal num
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Self
 
 import numpy as np
@@ -17,6 +17,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.sensor.array import Binning
 from vcam_cli.effects.signal_chain import NoiseSource, Site
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

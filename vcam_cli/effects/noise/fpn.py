@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Self
 
 import numpy as np
@@ -22,6 +22,7 @@ from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES
 from vcam_cli.effects.signal_chain import NoiseSource, Site
 from vcam_cli.errors import bad
+from vcam_cli.records import dataclass
 
 OVERFULL = 100
 """Full wells of charge in a hot pixel: more than the noise of any readout brings below one."""

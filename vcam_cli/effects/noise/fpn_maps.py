@@ -8,7 +8,7 @@ Dark current has shot noise of its own; gains act on the charge behind it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import Self
 
@@ -18,6 +18,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.signal_chain import NoiseSource, Site
+from vcam_cli.records import dataclass
 
 OFFSET, GAIN, DARK = MAPS = tuple(f"pixel.fpn.{n}_map" for n in ("offset", "gain", "dark"))
 """Keys under which the camera carries the maps that its files hold."""

@@ -7,7 +7,6 @@ a are drawn from the sensor seed and scaled to the rms, W and H are the sides of
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -17,6 +16,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.sensor.array import Binning
 from vcam_cli.effects.signal_chain import NoiseSource, Site
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ place of rms.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Self
 
@@ -21,6 +20,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.sensor.noise import at_gain
 from vcam_cli.effects.signal_chain import NoiseSource, Site
+from vcam_cli.records import dataclass
 
 LEAST_CHANCE = 2.0**-54
 """A number drawn evenly from 0 to 1 is kept this far from 0, half of the generator's step."""

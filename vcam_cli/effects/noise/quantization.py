@@ -7,7 +7,6 @@ A logarithmic ADC takes the logarithm of 1 + electrons / bend in place of the el
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -19,6 +18,7 @@ from vcam_cli.camera.derived.transfer_curve import Curve
 from vcam_cli.effects.noise.companding import CompandedQuantization
 from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.effects.signal_chain import Quantizer
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

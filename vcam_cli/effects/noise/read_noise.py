@@ -7,7 +7,6 @@ A column and a row have one draw each in a frame.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
 from vcam_cli.arrays import Array
@@ -16,6 +15,7 @@ from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES
 from vcam_cli.camera.sensor.noise import at_gain
 from vcam_cli.effects.signal_chain import NoiseSource, Site
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ C is the capacitance that is reset, T its temperature.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
 from vcam_cli.arrays import Array
@@ -17,6 +16,7 @@ from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES
 from vcam_cli.effects.signal_chain import NoiseSource, Site
 from vcam_cli.physics import readout
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

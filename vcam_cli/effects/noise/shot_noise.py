@@ -7,7 +7,6 @@ mu is the mean number of electrons of light and dark current together.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
 from vcam_cli.arrays import Array
@@ -16,6 +15,7 @@ from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import switched_off
 from vcam_cli.effects.signal_chain import NoiseSource, Site
 from vcam_cli.physics import noise
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ distance d before a lens that is focused at s: a shift of the image plane by v^2
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
 from vcam_cli.camera.camera import Camera
@@ -19,6 +18,7 @@ from vcam_cli.camera.derived.geometry import geometry as solve
 from vcam_cli.camera.derived.scene_layers import layer_cameras
 from vcam_cli.effects.base import Effect
 from vcam_cli.physics.depth_of_field import blur_diameter
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ N is the f-number, m the magnification, f the frequency on the sensor. The cut-o
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -19,6 +18,7 @@ from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import switched_off
 from vcam_cli.effects.blurs import RadialTransfer
 from vcam_cli.physics import diffraction
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ the change of area included.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -21,6 +20,7 @@ from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.lens_mapping import border, lens_mapping
 from vcam_cli.effects.warps import StillWarp
 from vcam_cli.physics.distortion import Mapping
+from vcam_cli.records import dataclass
 
 INSIDE = (0.25, 0.5, 0.75, 1.0)
 """Parts of the way to the border at which the displacement is looked at."""

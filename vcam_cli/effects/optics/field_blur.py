@@ -7,7 +7,7 @@ symmetric about its axis, so that elsewhere the wavefront is turned about it.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -32,6 +32,7 @@ from vcam_cli.effects.optics.wavefront_blur import (
 )
 from vcam_cli.physics import zernike
 from vcam_cli.physics.zernike import Terms
+from vcam_cli.records import dataclass
 
 TYPICAL_CHANGE = 0.1
 """Change of a wavefront from center to corner [waves rms] for which the settings' number of places

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -21,6 +20,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.effects.base import Effect
 from vcam_cli.effects.blurs import GeometricTransfer
 from vcam_cli.effects.optics.wavefront_blur import AberrationBlur
+from vcam_cli.records import dataclass
 
 LEFT, RIGHT = 1, -1
 """Side of the picture on which light of something near lands by each half of the lens, as the

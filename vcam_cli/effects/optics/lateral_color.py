@@ -8,8 +8,6 @@ sets their number (`image_formation.warps`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from vcam_cli.arrays import Array
@@ -18,6 +16,7 @@ from vcam_cli.camera.color_errors import WavelengthTable
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.traced import traced_view
 from vcam_cli.effects.warps import Magnification
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 from functools import reduce
 from itertools import product
 
@@ -23,6 +22,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import Effect
 from vcam_cli.effects.blurs import GeometricTransfer, SeparableTransfer
+from vcam_cli.records import dataclass
 
 Vectors = tuple[tuple[float, float], ...]
 

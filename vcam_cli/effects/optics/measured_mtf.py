@@ -7,7 +7,6 @@ holds in all directions; its phase is unknown and set to 0.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -21,6 +20,7 @@ from vcam_cli.effects.blurs import FieldTransfer, RadialTransfer, Zone
 from vcam_cli.effects.optics.field_blur import ZoneWeight
 from vcam_cli.effects.optics.wavefront_blur import GREEN, AberrationBlur
 from vcam_cli.physics import diffraction
+from vcam_cli.records import dataclass
 
 SHARE = 0.9
 """Share of a point's light within the blur's reach."""

@@ -9,7 +9,6 @@ aperture. Measured tables of all light, or of each filter color, take its place.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
 
@@ -25,6 +24,7 @@ from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.pixel_signal import Gain, NeutralGain
 from vcam_cli.floats import rms
 from vcam_cli.physics import radiometry
+from vcam_cli.records import dataclass
 
 ENTRIES = 1 << 17
 """Of the table of a measured falloff."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -13,6 +12,7 @@ from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.blurs import RadialTransfer
 from vcam_cli.physics.aberration import paraboloid_transfer
 from vcam_cli.physics.ray_spot import RaySpot
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

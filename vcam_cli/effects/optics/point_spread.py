@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
@@ -20,6 +20,7 @@ from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.blurs import PlaneTransfer
 from vcam_cli.effects.optics.wavefront_blur import AberrationBlur, largest_loss
 from vcam_cli.parallel import pieces
+from vcam_cli.records import dataclass
 
 PSF = "optics.psf"
 """Key under which the camera carries the samples of its point spread function."""

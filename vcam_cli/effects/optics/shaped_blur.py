@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
@@ -31,6 +31,7 @@ from vcam_cli.effects.optics.wavefront_blur import (
 from vcam_cli.physics import shaped_pupil, zernike
 from vcam_cli.physics.opening import CIRCLE, Opening
 from vcam_cli.physics.shaped_pupil import OtfGrid
+from vcam_cli.records import dataclass
 
 FEWEST_SAMPLES = 384
 """Samples across an opening: the OTF of an annulus errs by 5e-4."""

@@ -7,13 +7,13 @@ s is the veiling glare index, the mean is that of a color over the array.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.pixel_signal import VeilingGlare
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from threading import Lock
 from typing import Any
@@ -35,6 +35,7 @@ from vcam_cli.physics.aberration import MAX_SLOPE
 from vcam_cli.physics.interpolation import between_entries, lagrange
 from vcam_cli.physics.pupil_harmonics import direction_harmonics
 from vcam_cli.physics.shaped_pupil import OtfGrid
+from vcam_cli.records import dataclass
 
 FEWEST_PLACES, MOST_PLACES = 5, 9
 """Places from center to corner between which transfer functions are polynomials."""

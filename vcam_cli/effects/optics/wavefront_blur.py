@@ -7,7 +7,7 @@ switched off it is the blur of geometrical rays.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Self
 
@@ -23,6 +23,7 @@ from vcam_cli.effects.blurs import PlaneTransfer, RadialTransfer
 from vcam_cli.physics import aberration, diffraction, ray_blur, zernike
 from vcam_cli.physics.ray_spot import RaySpot
 from vcam_cli.physics.zernike import DEFOCUS, Terms
+from vcam_cli.records import dataclass
 
 GREEN = 550e-9
 """Wavelength that descriptions refer to [m]."""

@@ -9,7 +9,6 @@ and the ends of a column.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -21,6 +20,7 @@ from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.pixel_signal import Overflow
 from vcam_cli.errors import bad
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,6 @@ doi:10.1109/16.163473.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -30,6 +29,7 @@ from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.photodiode import diffusion
 from vcam_cli.effects.blurs import RadialTransfer
 from vcam_cli.physics import silicon
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

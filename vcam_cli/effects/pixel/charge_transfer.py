@@ -8,7 +8,6 @@ share e behind.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -18,6 +17,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.pixel_signal import Transport
+from vcam_cli.records import dataclass
 
 REST = 1e-9
 """Share of a packet that may be deferred further than is followed; it is lost."""

@@ -13,7 +13,6 @@ the covariance C_01 / C_00 = 2 c (1 - 4 c) / ((1 - 4 c)^2 + 4 c^2), about 2 c.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -24,6 +23,7 @@ from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.sensor.crosstalk import Kernel, Kernels
 from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.pixel_signal import NeighborSharing
+from vcam_cli.records import dataclass
 
 MIDDLE = 550e-9
 """Wavelength at which its contrast is stated [m]."""

@@ -7,7 +7,6 @@ T is the exposure time. The rate is the density times the photodetector's area, 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
 from vcam_cli.camera.camera import Camera
@@ -15,6 +14,7 @@ from vcam_cli.camera.derived.dark_current import dark_rate
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.pixel_signal import Charge
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

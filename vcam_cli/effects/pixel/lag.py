@@ -8,7 +8,6 @@ it is; behind a flash the part l^k of it is read k frames later, and no charge i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
 from vcam_cli.camera.camera import Camera
@@ -16,6 +15,7 @@ from vcam_cli.camera.derived.electrical import circuit
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.pixel_signal import Retention
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ is part of `pixel_aperture`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -21,6 +20,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.pixel_signal import NeutralGain
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

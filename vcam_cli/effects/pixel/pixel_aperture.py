@@ -8,7 +8,6 @@ of its microlens. Frequencies above the Nyquist frequency of the pitch alias.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -18,6 +17,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.blurs import SeparableTransfer
 from vcam_cli.effects.optics.turned_transfer import TurnedTransfer
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,6 @@ axis, where the loss bends most. Their number is doubled until the series has co
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Self
 
@@ -32,6 +31,7 @@ from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.pixel_signal import NeutralGain
 from vcam_cli.floats import rms
 from vcam_cli.physics import vignetting
+from vcam_cli.records import dataclass
 
 POINTS = (17, 33, 65)
 """Along each axis of the quadrant, as many as are needed."""

@@ -7,7 +7,6 @@ Noise of the pixel is added before the clip, so full pixels show only noise behi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -19,6 +18,7 @@ from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.readouts import has_several
 from vcam_cli.effects.readout_chain import merged_saturation
 from vcam_cli.effects.signal_chain import Limit, Site
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ whole picture.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -20,6 +19,7 @@ from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.mosaic import NONE, Mosaic
 from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.pixel_signal import ColumnSpread
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ whole number of periods has no modulation. A lamp with `duty` is on for that par
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
 from vcam_cli.arrays import Array
@@ -19,6 +18,7 @@ from vcam_cli.camera.scene.illuminant import FlickerSpec
 from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.pixel_signal import TemporalGain
 from vcam_cli.physics import flicker
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ sigma is the rms displacement of the image along each axis.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -16,6 +15,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.blurs import RadialTransfer
+from vcam_cli.records import dataclass
 
 REACH = 4.0
 """Standard deviations within which almost all of the light stays: all but 3e-4 of it."""

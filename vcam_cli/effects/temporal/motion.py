@@ -15,8 +15,6 @@ of the array's central row, which begins at 0 s. The motion determines the compu
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from vcam_cli.arrays import Array
@@ -28,6 +26,7 @@ from vcam_cli.effects.blurs import GeometricTransfer, SeparableTransfer
 from vcam_cli.effects.temporal.sub_exposed_motion import SubExposedMotion
 from vcam_cli.effects.warps import ImageMotion
 from vcam_cli.physics.motion_blur import path_transfer
+from vcam_cli.records import dataclass
 
 
 class Motion(Effect):

@@ -8,7 +8,7 @@ is the still image at another place; an exposure is the mean over instants.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.image_motion import ExposedMotion
 from vcam_cli.effects.warps import ImageMotion
+from vcam_cli.records import dataclass
 
 PLACES = 5
 """Places along each side of the sensor at which motion is looked at for the plan."""

@@ -21,7 +21,6 @@ from __future__ import annotations
 
 import struct
 import warnings
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -32,6 +31,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.files.file_checks import PNG_START
 from vcam_cli.files.images.icc import D50, Curve, linear, power, read_profile
 from vcam_cli.processing.color_correction import BRADFORD, CHROMATICITIES, RGB_TO_XYZ
+from vcam_cli.records import dataclass
 
 SAME_MATRIX = 2e-3
 """Coefficients closer than this to those of no change are none: profiles of sRGB round so."""

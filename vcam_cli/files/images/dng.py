@@ -17,7 +17,6 @@ darktable 4.2 refuses; deflate is for floating point alone (specification, tag C
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from importlib import import_module
 from importlib.util import find_spec
@@ -43,6 +42,7 @@ from vcam_cli.files.images.tiff import (
     write_directory,
 )
 from vcam_cli.parallel import available_workers, results
+from vcam_cli.records import dataclass
 
 TILE = 256
 """Most rows and columns of a tile."""

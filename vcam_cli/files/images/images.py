@@ -11,7 +11,6 @@ import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -32,6 +31,7 @@ from vcam_cli.files.images.color import Coding, picture_coding
 from vcam_cli.files.images.icc import converted_by_tables
 from vcam_cli.files.images.image_library import oiio
 from vcam_cli.files.images.rows import pending_error
+from vcam_cli.records import dataclass
 
 MOST_PIXELS = 10**9
 MOST_LIGHT = 1e30

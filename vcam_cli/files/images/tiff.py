@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -18,6 +18,7 @@ import numpy as np
 import vcam_cli
 from vcam_cli.arrays import Array
 from vcam_cli.files.atomic import write_whole
+from vcam_cli.records import dataclass
 
 Tag = tuple[int, str, int, Any]
 """Number, type as `struct` writes it, count, and value of a tag; rationals are flat pairs "2I",

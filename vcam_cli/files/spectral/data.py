@@ -6,12 +6,12 @@ the file, and returns a `SpectralData`; the checks and units of all formats are 
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from vcam_cli.files.file_checks import UnusableFile
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.hyperspectral import Quantity
 
 PER_NM = 1e9

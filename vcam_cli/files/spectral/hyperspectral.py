@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +18,7 @@ from vcam_cli.camera.scene.scene_files import Variables
 from vcam_cli.errors import CannotDo
 from vcam_cli.files.file_checks import UnusableFile, check_file, convert_errors
 from vcam_cli.files.spectral.data import MOST_LIGHT, SpectralData
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.hyperspectral import Bands, Cube, StoredSamples
 
 MOST_SAMPLES = 10**11

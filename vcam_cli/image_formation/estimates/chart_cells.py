@@ -15,7 +15,6 @@ all edges of the chart, with what lens and pixels pass, that is the error of the
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 from typing import NamedTuple
@@ -27,6 +26,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.image_formation.estimates.lens_contrast import lens_contrast
 from vcam_cli.image_formation.optical_path import OpticalPath
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.base import ChartScene, SampledScene
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region
 from vcam_cli.scenes.layered import LayerChart

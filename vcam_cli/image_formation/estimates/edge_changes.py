@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import TypeGuard
 
@@ -30,6 +29,7 @@ from vcam_cli.effects.blurs import Blur, FieldTransfer
 from vcam_cli.image_formation.field_dependence import Map, field_along, linear, map_position
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.parallel import product
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.base import ChartScene, Scene
 from vcam_cli.scenes.charts.slanted_edge import half_plane_cover
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import astuple, dataclass, field, replace
+from dataclasses import astuple, field, replace
 
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import Effect, of_kind
@@ -30,6 +30,7 @@ from vcam_cli.image_formation.estimates.chart_cells import (
 )
 from vcam_cli.image_formation.far_field import far_parts, near_field
 from vcam_cli.image_formation.optical_path import OpticalPath, SpectrumReport
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.base import ChartScene, HarmonicScene, SampledScene
 from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.layered import AnyScene, LayeredScene

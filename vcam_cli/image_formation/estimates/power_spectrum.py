@@ -10,7 +10,6 @@ the pixels.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cached_property, lru_cache, reduce
 
 import numpy as np
@@ -22,6 +21,7 @@ from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.scene_spectrum import Pair, SceneSpectrum, pairs
 from vcam_cli.image_formation.transfer_tables import Tables, reader
 from vcam_cli.parallel import product
+from vcam_cli.records import dataclass
 
 WIDTH = 1 / 20
 """Width of a block relative to its frequency: the lowest 40 terms are blocks of their own."""

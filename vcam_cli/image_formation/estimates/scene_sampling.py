@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from vcam_cli.image_formation.scene_spectrum import (
     transform_planes,
 )
 from vcam_cli.image_formation.transfer_tables import Mixing, Tables, bounding_tables, tabulate
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.base import ChartScene, SampledScene
 
 SINGLE = 5e-7

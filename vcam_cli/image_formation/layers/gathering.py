@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from vcam_cli.arrays import Array
@@ -11,6 +9,7 @@ from vcam_cli.camera.derived.geometry import pixel_centers
 from vcam_cli.image_formation.layers.ray_cells import Window
 from vcam_cli.image_formation.optical_path import Layer, Layers, OpticalPath
 from vcam_cli.parallel import pieces, rows_at_once
+from vcam_cli.records import dataclass
 
 
 @dataclass(frozen=True)

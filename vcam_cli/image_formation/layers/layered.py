@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -55,6 +55,7 @@ from vcam_cli.image_formation.optical_path import (
     SpectrumReport,
 )
 from vcam_cli.image_formation.transfer_functions import Transfer
+from vcam_cli.records import dataclass
 from vcam_cli.scenes import discs
 from vcam_cli.scenes.base import ChartScene, PaintedCells
 from vcam_cli.scenes.image import ImageScene

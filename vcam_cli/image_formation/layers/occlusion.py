@@ -30,12 +30,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.physics.opening import CIRCLE, Opening
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.cells import cell_means
 
 TURNS = (math.sqrt(5) - 1) / 2, math.sqrt(2) - 1

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -25,6 +25,7 @@ from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.image_formation.layers.occlusion import Place, Sums
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.transfer_functions import Transfer
+from vcam_cli.records import dataclass
 
 BORDER = 4
 """Pixels around a window from which diffraction and diffusion bring light."""

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -24,6 +23,7 @@ from vcam_cli.effects.optics.shaped_blur import opening_of
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.parallel import each
 from vcam_cli.physics.opening import CIRCLE, Opening
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.cells import cell_means
 from vcam_cli.scenes.depth_scene import DepthScene
 

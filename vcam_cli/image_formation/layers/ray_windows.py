@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property, lru_cache, partial
 from itertools import count
 from typing import NamedTuple
@@ -44,6 +44,7 @@ from vcam_cli.image_formation.layers.ray_cells import BORDER, Cells, SharpImage,
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.parallel import results
 from vcam_cli.physics.opening import Opening
+from vcam_cli.records import dataclass
 
 
 class Level(NamedTuple):

@@ -6,13 +6,14 @@ Reflectances: N. Ohta's measurement (1997), `spectra.colorchecker`.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.parallel import product
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.base import Chart, Frame
 from vcam_cli.scenes.cells import overlap
 from vcam_cli.spectra import Spectrum, colorchecker

@@ -21,11 +21,11 @@ References
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.base import Chart, Frame
 from vcam_cli.scenes.closed_form import Products
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region

@@ -19,13 +19,14 @@ References
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache, partial
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.cache import ByteCache
+from vcam_cli.records import dataclass
 from vcam_cli.scenes import discs
 from vcam_cli.scenes.base import Chart, Frame, PaintedCells
 from vcam_cli.scenes.cells import cell_edges

@@ -16,13 +16,13 @@ References
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
 from typing import TypeAlias
 
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.records import dataclass
 from vcam_cli.scenes import polygons
 from vcam_cli.scenes.base import Chart, Frame
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, counted_height, outline_energy

@@ -7,12 +7,12 @@ illuminant's color. The cloth goes on beyond the frame.
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.parallel import product
+from vcam_cli.records import dataclass
 from vcam_cli.scenes import discs
 from vcam_cli.scenes.base import Chart, Frame
 from vcam_cli.scenes.cells import clip_cells, overlap

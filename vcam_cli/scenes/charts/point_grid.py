@@ -4,11 +4,11 @@ The points have the radiance of a perfect white; the grid goes on without end.
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.records import dataclass
 from vcam_cli.scenes import discs
 from vcam_cli.scenes.base import Chart
 from vcam_cli.scenes.disc_edges import Discs

@@ -6,11 +6,12 @@ beyond it. Reflectances (1 - contrast) / 2 and (1 + contrast) / 2.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.records import dataclass
 from vcam_cli.scenes import polygons
 from vcam_cli.scenes.base import Chart
 from vcam_cli.scenes.edge_energy import (

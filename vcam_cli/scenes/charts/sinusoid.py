@@ -6,11 +6,11 @@ counterclockwise as seen, so that at 90 degrees it runs up a column.
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.base import Chart
 from vcam_cli.scenes.closed_form import Products
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region

@@ -7,11 +7,11 @@ contrast of 1 is black against white.
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.base import Chart
 from vcam_cli.scenes.cells import Spans
 from vcam_cli.scenes.closed_form import Profile

@@ -4,11 +4,10 @@ Bar i of n has the reflectance 10^(-D i / (n - 1)), D the density range. The bar
 beyond it the first and the last go on, and all go on above and below.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.base import Chart, Frame
 from vcam_cli.scenes.closed_form import Profile
 

@@ -4,11 +4,12 @@ Leaves under the card are not painted, but in the cells that the card covers in 
 lies under it is painted by itself and taken away.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.records import dataclass
 from vcam_cli.scenes.base import Chart
 from vcam_cli.scenes.cells import clip_cells
 from vcam_cli.scenes.charts.colorchecker import Card, ColorChecker
