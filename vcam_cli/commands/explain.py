@@ -63,6 +63,10 @@ def explanations(name: str) -> Iterator[dict[str, Any]]:
     yield from _of_unit(name.strip())
     plain = re.sub(r" ?\[.*\]$", "", name.strip())  # of a column with its unit
     word = re.sub(r"^f/[\d.]*$", "f_number", plain.lower().replace(" ", "_"))
+    if "." in word:  # a path: nothing else has a dot, and the tables of words take 40 ms
+        yield from _of_effect(word)
+        yield from (_of_key(where, key) for where, key in _keys_called(word))
+        return
     yield from _of_command(word)
     yield from _of_word(word.replace("-", "_"))
     yield from _of_effect(word)
@@ -81,15 +85,22 @@ def explanations(name: str) -> Iterator[dict[str, Any]]:
 
 
 @cache
+def _camera_keys() -> tuple[tuple[str, Any], ...]:
+    """Return the keys of a camera file, each path once."""
+    from vcam_cli.camera.hints import index
+
+    return tuple(("camera file", key) for key in index())
+
+
+@cache
 def _all_keys() -> tuple[tuple[str, Any], ...]:
     """Return all keys that files may have, with the kind of file; each path of a kind once."""
-    from vcam_cli.camera.hints import index
     from vcam_cli.capture_schedules.model import ScheduleStudy
     from vcam_cli.config.key_index import keys
     from vcam_cli.datasets.model import Dataset
     from vcam_cli.sweeps.model import Sweep
 
-    found = [("camera file", key) for key in index()]
+    found = list(_camera_keys())
     studies: dict[str, Any] = {
         "sweep study": Sweep,
         "schedule study": ScheduleStudy,
@@ -102,6 +113,10 @@ def _all_keys() -> tuple[tuple[str, Any], ...]:
 
 def _keys_called(word: str) -> list[tuple[str, Any]]:
     """Return the keys of a path, or those whose path ends so."""
+    if "." in word:  # studies share no more than first parts with cameras
+        whole = [(where, key) for where, key in _camera_keys() if key.dotted.lower() == word]
+        if whole:
+            return whole
     whole = [(where, key) for where, key in _all_keys() if key.dotted.lower() == word]
     ends = [(where, key) for where, key in _all_keys() if key.dotted.lower().endswith(f".{word}")]
     return whole or [found for found in ends if found[1].path[0] != "effects"]
@@ -120,11 +135,14 @@ def _of_key(where: str, key: Any) -> dict[str, Any]:
         "default": default,
         "example": f"{key.name}: {key.example}",
     }
-    below = [k.name for place, k in _all_keys() if place == where and k.path[:-1] == key.path]
+    of_file = _camera_keys() if where == "camera file" else _all_keys()
+    below = [k.name for place, k in of_file if place == where and k.path[:-1] == key.path]
     if below and key.path[0] != "effects":
         entry["keys"] = f"{', '.join(dict.fromkeys(below))}; vcam explain {key.dotted}.{below[0]}"
+    if where != "camera file" or key.path[0] == "effects":
+        return entry
     effects = [effect for effect in _effects().values() if concerns(effect, key)]
-    if where == "camera file" and effects and key.path[0] != "effects":
+    if effects:
         entry["effect"] = "; ".join(f"{effect.name} ({effect.reference})" for effect in effects)
         entry["see also"] = ", ".join(f"vcam explain {effect.name}" for effect in effects)
     return entry
@@ -159,23 +177,23 @@ def _when(effect: Any) -> str:
 def _of_effect(word: str) -> Iterator[dict[str, Any]]:
     import inspect
 
+    from vcam_cli.camera.simulation import EFFECTS
+
+    name = word.removeprefix("effects.").replace("-", "_")
+    if name not in EFFECTS:
+        return
     from vcam_cli.effects.blurs import Blur, FieldTransfer, SeparableTransfer
     from vcam_cli.effects.warps import ImageMotion
 
-    effect = _effects().get(word.removeprefix("effects.").replace("-", "_"))
-    if effect is None:
-        return
+    effect = _effects()[name]
     filters = issubclass(effect, Blur | FieldTransfer | SeparableTransfer | ImageMotion)
     cost = "one or two Fourier transforms; the plan shows their time" if filters else "little"
     if effect.seconds_per_pixel:
         cost = f"about {effect.seconds_per_pixel * 1e9:.2g} ns a pixel on one core"
     keys = [
         key.dotted
-        for where, key in _all_keys()
-        if where == "camera file"
-        and key.path[0] != "effects"
-        and len(key.path) > 1
-        and concerns(effect, key)
+        for _, key in _camera_keys()
+        if key.path[0] != "effects" and len(key.path) > 1 and concerns(effect, key)
     ]
     yield {
         "title": f"{effect.name} (effect of the {effect.origin})",
