@@ -27,6 +27,8 @@ from vcam_cli.floats import own_float_errors
 
 EXAMPLE = "starter"
 """The shipped camera whose sections stand in for those that a file has wrong."""
+STUDIES = ("sweep", "schedule", "dataset")
+"""What `kind` of a study may be; a camera file has none."""
 FILE_KEYS = frozenset(
     {"file", "positions", "mask", "image.depth", "offset_map", "gain_map", "dark_map"}
 )
@@ -105,7 +107,7 @@ def example() -> Camera:
 def _refuse_study(root: Node) -> None:
     """Raise BadInput where the file is a study and not a camera."""
     kind = root.get("kind")
-    if kind is not None and kind.value in ("sweep", "schedule", "dataset"):
+    if kind is not None and kind.value in STUDIES:
         message, remedy = f"this is a study (kind: {kind.value})", "give a camera file"
         remedy += f", or run the study with vcam {kind.value}"
         raise BadInput([kind.problem(("kind",), message, remedy)])

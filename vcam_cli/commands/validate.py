@@ -103,11 +103,11 @@ def _checked_name(file: str, sets: list[str]) -> str:
 
 def _study_kind(file: str) -> str | None:
     """Return the kind that a file, or a shipped one, says it is; None for a camera."""
+    from vcam_cli.camera.camera import STUDIES
     from vcam_cli.config import shipped
     from vcam_cli.config.file_names import is_file
     from vcam_cli.config.yaml_reader import read_file
     from vcam_cli.errors import VcamError
-    from vcam_cli.sweeps.model import KINDS
 
     path = Path(file)
     if path.suffix.lower() == ".zmx":
@@ -124,6 +124,6 @@ def _study_kind(file: str) -> str | None:
         return None
     return (
         str(kind.value)
-        if kind is not None and kind.value in (*KINDS, "dataset", MEASUREMENT, LENS)
+        if kind is not None and kind.value in (*STUDIES, MEASUREMENT, LENS)
         else None
     )

@@ -6,7 +6,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import field
-from typing import ClassVar, Literal, Self
+from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 import numpy as np
 
@@ -15,7 +15,9 @@ from vcam_cli.camera.sensor.array import Binning
 from vcam_cli.effects.base import Effect, SignalLevels, of_kind
 from vcam_cli.physics import noise
 from vcam_cli.records import dataclass
-from vcam_cli.rng import Stream, coarse_normals
+
+if TYPE_CHECKING:
+    from vcam_cli.rng import Stream
 
 SIGMAS = 6.0
 """Standard deviations of the noise that count as its extremes."""
@@ -81,6 +83,8 @@ class Site:
             Numbers (rows, columns) without unit.
         """
         if self.coarse_normals:
+            from vcam_cli.rng import coarse_normals  # with NumPy's generators, to draw alone
+
             return coarse_normals(self.stream(name), self.rows, self.columns, self.dtype)
         return self.stream(name).standard_normal((self.rows, self.columns), dtype=self.dtype)
 

@@ -7,7 +7,7 @@ from pydantic import model_validator
 from pydantic_core import InitErrorDetails
 
 from vcam_cli.camera.spectrum import Spectral, SpectrumSpec, balanced
-from vcam_cli.config import shipped, yaml_reader
+from vcam_cli.config import shipped
 from vcam_cli.config.lists import read_items
 from vcam_cli.config.model import Model, all_or_none, at_most_one, key
 from vcam_cli.config.quantities import Whole
@@ -138,6 +138,8 @@ def _filters_of_file(given: Mapping[Any, Any]) -> dict[str, SpectrumSpec]:
 
 def filter_set(name: str) -> dict[str, SpectrumSpec]:
     """Return the filters of a set that ships, by color; raise ValueError for another name."""
+    from vcam_cli.config import yaml_reader  # `vcam list` reads no YAML
+
     try:
         path = shipped.find("filters", name)
         tree: Any = yaml_reader.read_file(path).plain()

@@ -19,7 +19,6 @@ from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.blurs import PlaneTransfer
 from vcam_cli.effects.optics.wavefront_blur import AberrationBlur, largest_loss
-from vcam_cli.parallel import pieces
 from vcam_cli.records import dataclass
 
 PSF = "optics.psf"
@@ -137,6 +136,8 @@ class PointSpread(AberrationBlur, PlaneTransfer):
         key = frequency.tobytes(), across
 
         def compute() -> Array:
+            from vcam_cli.parallel import pieces  # threads, which `vcam explain` does not need
+
             some = pieces(len(frequency), AT_ONCE)
             return np.concatenate([self._channels_along(frequency[s], across) for s in some], 1)
 

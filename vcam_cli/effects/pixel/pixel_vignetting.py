@@ -20,7 +20,6 @@ from functools import lru_cache
 from typing import Self
 
 import numpy as np
-from numpy.polynomial import chebyshev
 
 from vcam_cli.arrays import Array
 from vcam_cli.cache import remembered
@@ -131,7 +130,9 @@ class PixelVignetting(NeutralGain):
         series = _series(self)
         order = len(series) - 1
         across, down = (
-            chebyshev.chebvander(2 * np.minimum(np.abs(at.astype(float)) / half, 1) - 1, order)
+            np.polynomial.chebyshev.chebvander(
+                2 * np.minimum(np.abs(at.astype(float)) / half, 1) - 1, order
+            )
             for at, half in ((x, self.half_width), (y, self.half_height))
         )
         rows, columns = (down @ series).astype(x.dtype), across.T.astype(x.dtype)
@@ -158,11 +159,11 @@ def _series(effect: PixelVignetting) -> Array:
     deep that it ends within the field, to half of the tolerance, a tenth of it rms.
     """
     for count in (effect.points,) if effect.points else POINTS:
-        points = chebyshev.chebpts1(count)
+        points = np.polynomial.chebyshev.chebpts1(count)
         x, y = (half * (1 + points) / 2 for half in (effect.half_width, effect.half_height))
         rows = (slice(i, i + ROWS) for i in range(0, count, ROWS))
         values = np.concatenate([effect.exact_gain(x[None, :], y[some, None]) for some in rows])
-        invert = np.linalg.inv(chebyshev.chebvander(points, count - 1))
+        invert = np.linalg.inv(np.polynomial.chebyshev.chebvander(points, count - 1))
         series = invert @ values @ invert.T
         last = max(np.abs(series[-3:]).sum(0).max(), np.abs(series[:, -3:]).sum(1).max())
         if last < OF_TOLERANCE * effect.tolerance:
