@@ -315,8 +315,7 @@ def _read_table(
     file: str, outside: Outside, column: str | None, unit: str | None, changed: tuple[int, ...]
 ) -> tuple[spectra.Table, bool]:
     """Return the table of a file, read once as long as it does not change: sweeps ask often."""
-    table = spectra.read_spectrum(file, outside, column, unit)
-    return table, spectra.is_per_watt(file, column)
+    return spectra.read_sensitivity(file, outside, column, unit)
 
 
 def _resolve(

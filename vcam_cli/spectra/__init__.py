@@ -9,7 +9,7 @@ a millisecond and removes the question.
 """
 
 from vcam_cli.spectra.integration import hat_weights, integral, pair_weights, quadrature
-from vcam_cli.spectra.measured import is_per_watt, read_spectrum
+from vcam_cli.spectra.measured import read_sensitivity, read_spectrum
 from vcam_cli.spectra.spectrum import (
     BOLTZMANN,
     PHOTONS,
@@ -50,11 +50,11 @@ __all__ = [
     "illuminant",
     "illuminant_names",
     "integral",
-    "is_per_watt",
     "luminance",
     "pair_weights",
     "photons",
     "quadrature",
+    "read_sensitivity",
     "read_spectrum",
     "silicon_absorption",
     "srgb_reflectances",

@@ -74,13 +74,27 @@ def read_spectrum(
     OSError
         The file cannot be read.
     """
+    return read_sensitivity(path, outside, column, unit)[0]
+
+
+def read_sensitivity(
+    path: str | PathLike[str],
+    outside: Outside = "error",
+    column: str | None = None,
+    unit: str | None = None,
+) -> tuple[Table, bool]:
+    """Return a spectrum, and whether the name of its column says that it is one per watt.
+
+    Parameters, and what is raised, are those of `read_spectrum`.
+    """
     file = Path(path)
     sheet = _read_sheet(file)
     of_wavelength = _wavelength_column(sheet.names)
     of_value = _value_column(file, sheet.names, of_wavelength, column)
     unit = unit or _wavelength_unit(file, sheet.names[of_wavelength], sheet.rows[:, of_wavelength])
     wavelength, value = sheet.rows[:, of_wavelength], sheet.rows[:, of_value]
-    if _PERCENT.search(sheet.names[of_value].lower()):
+    name = sheet.names[of_value].lower()
+    if _PERCENT.search(name):
         value = value / 100
     if (value < 0).any():
         first = int(np.argmax(value < 0))
@@ -93,9 +107,10 @@ def read_spectrum(
     if len(wavelength) > 1 and (np.diff(wavelength) < 0).all():
         wavelength, value = wavelength[::-1], value[::-1]
     try:
-        return Table(_in_meters(wavelength, unit), value, outside)
+        table = Table(_in_meters(wavelength, unit), value, outside)
     except ValueError as error:
         raise ValueError(f"{file}: {error}") from None
+    return table, bool(_PER_WATT.search(name))
 
 
 def column_names(path: str | PathLike[str]) -> tuple[str, ...]:
@@ -103,17 +118,6 @@ def column_names(path: str | PathLike[str]) -> tuple[str, ...]:
     names = _read_sheet(Path(path)).names
     of_wavelength = _wavelength_column(names)
     return tuple(bare_name(name) for i, name in enumerate(names) if i != of_wavelength)
-
-
-def is_per_watt(path: str | PathLike[str], column: str | None = None) -> bool:
-    """Return whether the name of a column says that it is a sensitivity per watt.
-
-    Raises as `read_spectrum`.
-    """
-    file = Path(path)
-    names = _read_sheet(file).names
-    chosen = _value_column(file, names, _wavelength_column(names), column)
-    return bool(_PER_WATT.search(names[chosen].lower()))
 
 
 def bare_name(name: str) -> str:
