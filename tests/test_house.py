@@ -26,7 +26,7 @@ import vcam_cli
 PACKAGE = Path(vcam_cli.__file__).parent
 
 FLOORS = (
-    {"records"},
+    {"records", "lamps"},
     {"arrays", "cache", "errors", "interrupts", "arguments"},
     {"units", "rng", "progress", "parallel", "floats"},
     {"memory", "spectra", "scheduling", "source_code"},

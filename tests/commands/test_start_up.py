@@ -6,12 +6,13 @@ import sys
 THREADS = "concurrent.futures", "logging", "vcam_cli.parallel"
 NUMPY = "numpy.random", "numpy.polynomial"  # NumPy itself loads them when they are used
 HEAVY = "scipy", "OpenImageIO", "matplotlib", "vcam_cli.image_formation.photon_rate"
-DRAWS = "vcam_cli.rng", "vcam_cli.effects.noise.sources"
+DRAWS, SOURCES, STUDIES = "vcam_cli.rng", "vcam_cli.effects.noise.sources", "vcam_cli.sweeps.model"
 EFFECTS, TRACER = "vcam_cli.effects.order", "vcam_cli.lenses"
+LIGHT = (*HEAVY, *THREADS, *NUMPY, TRACER, DRAWS)
 UNUSED = {
-    "list": (*HEAVY, *THREADS, *NUMPY, TRACER, EFFECTS, "vcam_cli.camera.camera"),
-    "validate starter": (*HEAVY, *THREADS, *NUMPY, TRACER, EFFECTS, *DRAWS),
-    "explain optics.f_number": (*HEAVY, TRACER),
+    "list": (*LIGHT, EFFECTS, "numpy", "yaml", "vcam_cli.camera.camera"),
+    "validate starter": (*LIGHT, EFFECTS, SOURCES, STUDIES),
+    "explain optics.f_number": (*LIGHT, STUDIES, "vcam_cli.commands.glossary"),
     "explain snr": (*HEAVY, TRACER),
 }
 """Command -> modules that it works without; every command keeps those of the ones before it."""

@@ -1,26 +1,21 @@
 """Processing: what is done to the raw frame, step by step, in the user's order."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, get_args
+from typing import Any
 
 from pydantic import ValidationError
 from pydantic_core import InitErrorDetails
 
 from vcam_cli.camera.processing_steps import (
+    ANY_STEP,
+    STEPS,
     BlackLevel,
     ColorCorrection,
     Demosaic,
-    Denoise,
     Gamma,
-    GamutMapping,
-    Jpeg,
-    LensDistortion,
-    LensShading,
     Matrix,
     Remosaic,
-    Sharpen,
     Step,
-    Tone,
     WhiteBalance,
 )
 from vcam_cli.camera.sensor.array import Array
@@ -34,23 +29,6 @@ from vcam_cli.errors import one_line
 SHOWN = (0, 1, 3)
 """Numbers of colors that make a picture as they are; 0 where only the file of positions knows."""
 Steps = tuple[Step, ...]
-_ANY = (
-    BlackLevel
-    | Remosaic
-    | Demosaic
-    | WhiteBalance
-    | ColorCorrection
-    | Denoise
-    | Sharpen
-    | GamutMapping
-    | LensShading
-    | LensDistortion
-    | Tone
-    | Gamma
-    | Jpeg
-)
-STEPS: dict[str, type[Step]] = {next(iter(step.model_fields)): step for step in get_args(_ANY)}
-"""Name of a step -> its model."""
 
 
 def _steps(given: Any) -> Steps:
@@ -117,7 +95,7 @@ SCATTERED = (
     "the falloff of scattered pixels is undone on the picture's grid",
     "add demosaic: bilinear to processing",
 )
-STEP_LIST = Either(_steps, list[_ANY])
+STEP_LIST = Either(_steps, list[ANY_STEP])
 """The type of `processing`."""
 
 

@@ -1,7 +1,7 @@
 """The steps that `processing` may have: a model for each, of one key, the step's name."""
 
 from functools import cache
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
 from vcam_cli.config.model import Model, key
 from vcam_cli.config.quantities import Number, Quantity, Whole
@@ -233,3 +233,22 @@ class Jpeg(Step):
         " metrics compare linear light before compression",
         example={"quality": 90},
     )
+
+
+ANY_STEP = (
+    BlackLevel
+    | Remosaic
+    | Demosaic
+    | WhiteBalance
+    | ColorCorrection
+    | Denoise
+    | Sharpen
+    | GamutMapping
+    | LensShading
+    | LensDistortion
+    | Tone
+    | Gamma
+    | Jpeg
+)
+STEPS: dict[str, type[Step]] = {next(iter(step.model_fields)): step for step in get_args(ANY_STEP)}
+"""Name of a step -> its model."""

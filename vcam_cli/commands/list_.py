@@ -171,9 +171,9 @@ def _models() -> list[Item]:
 
 
 def _illuminants() -> list[Item]:
-    from vcam_cli.spectra import LAMPS, illuminant_names
+    from vcam_cli.lamps import LAMPS
 
-    named = [Item(name, LAMPS[name]) for name in illuminant_names()]
+    named = [Item(name, about) for name, about in LAMPS.items()]
     return [
         *named,
         Item("{blackbody: 5500 K}", "a blackbody of any temperature"),
@@ -189,7 +189,7 @@ def _effects() -> list[Item]:
 
 
 def _steps() -> list[Item]:
-    from vcam_cli.camera.processing import STEPS
+    from vcam_cli.camera.processing_steps import STEPS
     from vcam_cli.camera.step_plugins import origin, registered
 
     foreign = {name: point for name, point in registered().items() if name not in STEPS}

@@ -20,7 +20,6 @@ from vcam_cli.spectra.spectrum import (
     photons,
 )
 from vcam_cli.spectra.standard import (
-    LAMPS,
     LUMINOUS_EFFICACY,
     VISIBLE,
     cmf,
@@ -35,7 +34,6 @@ from vcam_cli.spectra.standard import (
 
 __all__ = [
     "BOLTZMANN",
-    "LAMPS",
     "LUMINOUS_EFFICACY",
     "PHOTONS",
     "PLANCK",

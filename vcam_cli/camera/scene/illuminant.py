@@ -12,6 +12,7 @@ from vcam_cli.config.validation_messages import describe
 from vcam_cli.config.values import Angle, Percent, Temperature, Wavelength, mapping
 from vcam_cli.config.yaml_type import DEFINED, YamlType, to_yaml
 from vcam_cli.errors import Path, bad
+from vcam_cli.lamps import LAMPS
 from vcam_cli.records import dataclass
 from vcam_cli.spectra.spectrum import Outside
 
@@ -199,7 +200,7 @@ class Illuminant(YamlType):
 
     def json_schema(self, forms: dict[str, Any]) -> dict[str, Any]:
         """Return the definition of a lamp."""
-        known = [{"const": name, "description": f"{said}."} for name, said in spectra.LAMPS.items()]
+        known = [{"const": name, "description": f"{said}."} for name, said in LAMPS.items()]
         named = {"type": "string", "examples": list(spectra.illuminant_names())}
         return {
             DEFINED: {
