@@ -28,6 +28,16 @@ from vcam_cli.config.quantities import Quantity
 from vcam_cli.units import DIMENSIONS
 
 
+def test_defaults_that_are_not_validated_are_valid():
+    fields = [field for model in models() for field in model.model_fields.values()]
+    made = [f.default_factory for f in fields if "model_construct" in repr(f.default_factory)]
+    assert len(made) > 10
+    for construct in made:
+        given, valid = construct(), construct.__self__()
+        assert given.__dict__ == valid.__dict__
+        assert given == valid
+
+
 def models() -> list[type[Model]]:
     """Every model of a camera or technology file."""
     found, queue = [], [Model]

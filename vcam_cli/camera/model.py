@@ -90,8 +90,10 @@ class CameraModel(FileModel):
         example="standard",
         default=Accuracy,
     )
-    seed: Seed = key("seeds of the random numbers", example={"frame": 1}, default=Seed)
-    output: Output = key("output files", example={"raw": ["dn"]}, default=Output)
+    seed: Seed = key(
+        "seeds of the random numbers", example={"frame": 1}, default=Seed.model_construct
+    )
+    output: Output = key("output files", example={"raw": ["dn"]}, default=Output.model_construct)
 
     _samples: tuple[tuple[str, Any], ...] = PrivateAttr(default=())
     _exposure_gain: float | None = PrivateAttr(default=None)

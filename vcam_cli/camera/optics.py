@@ -549,7 +549,7 @@ class Optics(Model):
     focus_window: Annotated[FocusWindow, mapping(FocusWindow)] = key(
         "window of focus: auto; default the middle half of the picture's width and height",
         example={"x": 0.3, "y": 0.7, "width": 0.1, "height": 0.1},
-        default=FocusWindow,
+        default=FocusWindow.model_construct,
     )
     defocus: Shift = key(
         "shift of the image plane away from the lens, so that the sensor lies in front of it",

@@ -144,7 +144,8 @@ def key(
     example : object, optional
         A value as YAML has it; default `default`.
     default : object, optional
-        Value where the key is not given; the key is required without one.
+        Value where the key is not given; the key is required without one. For a mapping without
+        keys it is `Model.model_construct`: to validate one takes 0.5 ms, once.
     unit : str, optional
         Unit that a user may write, "" for none; default that of the example.
     **more

@@ -144,7 +144,7 @@ def process(camera: CameraModel) -> Process:
         supply=numbers.supply,
         voltage_swing=numbers.voltage_swing,
         reset_voltage=numbers.reset_voltage,
-        thresholds=numbers.thresholds or Thresholds(),
+        thresholds=numbers.thresholds or Thresholds.model_construct(),
         junction=_overlay(junction, detector.junction),
         gate=numbers.gate,
         pinned=numbers.pinned,
@@ -183,7 +183,7 @@ def _example(key: str, bare: bool) -> object:
 @cache
 def _no_numbers() -> Numbers:
     """Return what a camera without a technology has: to make it takes most of `process`."""
-    return Numbers()
+    return Numbers.model_construct()
 
 
 def _numbers(choice: TechnologyChoice) -> Technology:

@@ -202,7 +202,7 @@ class Photodetector(Model):
     junction: Junction = key(
         "overrides of the technology's junction (or of its well)",
         example={"depth": "0.2 um"},
-        default=Junction,
+        default=Junction.model_construct,
     )
 
     rules = (at_most_one("dark_current_density", "dark_current"), all_or_none("width", "height"))

@@ -403,7 +403,9 @@ class Pixel(Model):
     fpn: FixedPattern = key(
         "fixed-pattern noise", example={"offset_pixel": "2 e"}, default=FixedPattern
     )
-    defects: Defects = key("pixels that do not work", example={"hot": 0}, default=Defects)
+    defects: Defects = key(
+        "pixels that do not work", example={"hot": 0}, default=Defects.model_construct
+    )
     stack: Annotated[Stack | None, word_or(Stack, {"none": None})] = key(
         "layers above the photodetector, which vignette it", example="none", default=None
     )

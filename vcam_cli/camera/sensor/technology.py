@@ -223,26 +223,30 @@ class Numbers(Model):
         default=None,
     )
     junction: Junction = key(
-        "the photodiode's junction", example={"depth": "0.2 um"}, default=Junction
+        "the photodiode's junction", example={"depth": "0.2 um"}, default=Junction.model_construct
     )
     well: Well = key(
         "depth and doping of a photodetector nwell-psub",
         example={"depth": "1.5 um", "donors": "1e17 1/cm3", "acceptors": "1.6e15 1/cm3"},
-        default=Well,
+        default=Well.model_construct,
     )
     pinned: Pinned = key(
-        "implants of a pinned photodetector", example={"layer": "0.25 um"}, default=Pinned
+        "implants of a pinned photodetector",
+        example={"layer": "0.25 um"},
+        default=Pinned.model_construct,
     )
-    gate: Gate = key("of a photogate", example={"thickness": "0.25 um"}, default=Gate)
+    gate: Gate = key(
+        "of a photogate", example={"thickness": "0.25 um"}, default=Gate.model_construct
+    )
     capacitance: JunctionCapacitance = key(
         "junction capacitance at zero bias",
         example={"area": "0.906 fF/um2", "sidewall": "0.297 fF/um"},
-        default=JunctionCapacitance,
+        default=JunctionCapacitance.model_construct,
     )
     dark_current: TechnologyDarkCurrent = key(
         "dark current of the photodiode",
         example={"area": "10 nA/cm2", "perimeter": "geometry"},
-        default=TechnologyDarkCurrent,
+        default=TechnologyDarkCurrent.model_construct,
     )
     quantum_efficiency_scale: MaybeFraction = key(
         "reflection and stack; 1 when the camera gives a stack", example=0.75, default=None
@@ -250,12 +254,12 @@ class Numbers(Model):
     layout: Layout = key(
         "photodetector layout within the pixel",
         example={"border": 5.017, "transistors": 91.1},
-        default=Layout,
+        default=Layout.model_construct,
     )
     scaling: Scaling = key(
         "scaling of parameters with the feature size",
         example={"dark_current_perimeter": 0},
-        default=Scaling,
+        default=Scaling.model_construct,
     )
 
     rules = (at_most_one("voltage_swing", "thresholds"), at_most_one("reset_voltage", "thresholds"))
