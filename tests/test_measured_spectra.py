@@ -4,7 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 from making import GONE, camera
 
@@ -86,7 +87,7 @@ def test_the_wavelength_may_stand_in_another_column(tmp_path):
     np.testing.assert_array_equal(table.value, [0.5, 0.6])
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(
     st.lists(st.floats(0.1, 20.0), min_size=2, max_size=6, unique=True),
     st.sampled_from([",", ";", "\t"]),

@@ -118,7 +118,16 @@ TRACED = {"double-gauss", "phone-double-gauss"}
 """Lenses by prescriptions, which take seconds; test_traced_frames.py has frames through one."""
 
 
-@pytest.mark.parametrize("name", long_except(set(CAMERAS) - TRACED, CAMERAS))
+RUN = (
+    *("12mp-bayer", "ar0132at", "cfa-honeycomb", "cfa-rgbw", "csf-color-0.35um", "dual-pixel"),
+    *("everything", "eye-chart", "fisheye", "hdr-captures", "imx586", "imx708", "imx900"),
+    *("kai-02170", "lateral-color", "mt9v011", "split-pixel", "starter", "street", "table-top"),
+    *("test-pixel-0.18um", "x3-junctions", "x3-stacked"),
+)
+"""Together they have every effect, scene, pattern, processing step and section of them all."""
+
+
+@pytest.mark.parametrize("name", long_except(set(RUN) - TRACED, CAMERAS))
 def test_a_camera_runs(name, tmp_path):
     """And the picture has dark and light areas, and is not mostly clipped."""
     line = ["run", name, "-q", "-o", str(tmp_path / "out")]

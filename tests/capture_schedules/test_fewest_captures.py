@@ -3,7 +3,8 @@
 import math
 
 import pytest
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 
 from vcam_cli.capture_schedules.fewest_captures import fewest_captures
@@ -40,7 +41,7 @@ def test_uniform_pdf():
     assert found[6].gain is None
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(
     st.lists(st.integers(0, 30), min_size=1, max_size=40),
     st.lists(st.integers(-2, 35), min_size=1, max_size=5),

@@ -5,7 +5,8 @@ import os
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 
 from vcam_cli.config import yaml_reader
@@ -170,7 +171,7 @@ def test_depth_is_counted_through_aliases():
     assert "nested deeper than 64 levels" in problem
 
 
-@settings(max_examples=300, deadline=None)
+@examples(300)
 @given(st.text(alphabet="ab:-[]{}#&*!|>'\"%@`\n\t ,?~0.", max_size=60))
 def test_no_text_makes_anything_but_a_tree_or_a_refusal(text):
     try:
@@ -184,7 +185,7 @@ TEXT = st.text(st.characters(max_codepoint=0xFFFF, exclude_categories=["Cs"]))
 NUMBERS = st.integers() | st.floats(allow_nan=False, allow_infinity=False)
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(
     st.recursive(
         st.none() | st.booleans() | NUMBERS | TEXT,

@@ -4,7 +4,8 @@ import math
 
 import pytest
 import yaml
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 from making import tree
 from typer.testing import CliRunner
@@ -99,7 +100,7 @@ _formulas = st.recursive(
 )
 
 
-@settings(max_examples=200, deadline=None)
+@examples(200)
 @given(_formulas, _numbers, _numbers)
 def test_bare_numbers_are_computed_as_python_does(text, a, b):
     try:

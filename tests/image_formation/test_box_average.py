@@ -118,12 +118,12 @@ def test_areas_by_many_points(name, fill):
 
     An edge that leaves a row of points at the wrong side by half a step at most errs by 1 / 400.
     """
-    g = sensor(10, 14, FILLS[fill], SHIFT[fill], pitch=(1e-6, 1e-6))
+    g = sensor(6, 8, FILLS[fill], SHIFT[fill], pitch=(1e-6, 1e-6))
     got = signal(path(g, aperture(g)), on_chart(path(g, aperture(g)), POINTS[name]))
     place = (np.arange(200) + 0.5) / 200 - 0.5
-    x = (np.arange(14)[:, None] - 6.5) * 1e-6 + g.collecting_x + place * g.collecting_width
-    y = (np.arange(10)[:, None] - 4.5) * 1e-6 + g.collecting_y + place * g.collecting_height
-    points = POINTS[name].values(x.ravel(), y.ravel(), ONE).reshape(10, 200, 14, 200)
+    x = (np.arange(8)[:, None] - 3.5) * 1e-6 + g.collecting_x + place * g.collecting_width
+    y = (np.arange(6)[:, None] - 2.5) * 1e-6 + g.collecting_y + place * g.collecting_height
+    points = POINTS[name].values(x.ravel(), y.ravel(), ONE).reshape(6, 200, 8, 200)
     np.testing.assert_allclose(got, points.mean(axis=(1, 3)), atol=1 / 400)
 
 

@@ -7,7 +7,8 @@ from pathlib import Path
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 
 from vcam_cli.physics import junction, silicon
@@ -53,7 +54,7 @@ def test_efficiency_in_sixty_digits(case):
 
 
 @given(absorptions, depths())
-@settings(max_examples=200, deadline=None)
+@examples(200)
 def test_efficiency_as_printed(a, x):
     """Eq 2.30 itself, with as many digits as it takes."""
     with mpmath.workdps(60):
@@ -65,7 +66,7 @@ def test_efficiency_as_printed(a, x):
 
 
 @given(absorptions, depths())
-@settings(max_examples=200, deadline=None)
+@examples(200)
 def test_efficiencies_lie_between_none_and_all(a, x):
     x1, x2, x3 = x
     ndiff, pinned = pd.quantum_efficiency(a, *x), pd.quantum_efficiency_pinned(a, *x)
@@ -79,7 +80,7 @@ def test_efficiencies_lie_between_none_and_all(a, x):
 
 
 @given(absorptions, depths(), st.floats(1, 100))
-@settings(max_examples=100, deadline=None)
+@examples(100)
 def test_efficiency_rises_with_the_depth_that_collects(a, x, deeper):
     x1, x2, x3 = x
     for efficiency in (pd.quantum_efficiency, pd.quantum_efficiency_pinned):
@@ -87,7 +88,7 @@ def test_efficiency_rises_with_the_depth_that_collects(a, x, deeper):
 
 
 @given(absorptions, depths(), st.integers(-40, 40))
-@settings(max_examples=50, deadline=None)
+@examples(50)
 def test_efficiency_knows_no_unit_of_length(a, x, power):
     """Scaled by a power of two every intermediate number is the same."""
     s = 2.0**power
@@ -128,7 +129,7 @@ def test_efficiency_at_its_limits():
 
 
 @given(absorptions, depths())
-@settings(max_examples=50, deadline=None)
+@examples(50)
 def test_a_photogate_without_a_film_is_a_junction_without_a_surface(a, x):
     _, x2, x3 = x
     bare = pd.quantum_efficiency_photogate(a, 0.0, x2, x3)
@@ -141,7 +142,7 @@ def test_a_photogate_without_a_film_is_a_junction_without_a_surface(a, x):
 
 
 @given(absorptions, depths())
-@settings(max_examples=50, deadline=None)
+@examples(50)
 def test_efficiency_is_the_diffusion_of_charge_at_rest(a, x):
     """Without recombination and with a surface that loses nothing, 2.28 at f = 0 is 2.30."""
     _, x2, x3 = x
@@ -244,7 +245,7 @@ def test_depletion_width_of_a_plate_capacitor():
 
 
 @given(widths, widths, widths)
-@settings(max_examples=50, deadline=None)
+@examples(50)
 def test_depletion_region_is_neutral(width, donors, acceptors):
     x_n, x_p = junction.depletion_split(width, donors, acceptors)
     assert x_n + x_p == pytest.approx(width, rel=1e-14)
@@ -267,7 +268,7 @@ gradings = st.floats(0.05, 3)
 
 
 @given(voltages, st.floats(1e-9, 20), built_ins, gradings)
-@settings(max_examples=150, deadline=None)
+@examples(150)
 def test_mean_capacitance_is_the_integral(low, span, built_in, grading):
     """By 30-digit quadrature: the width of the range as the function sees it."""
     high = low + span
@@ -296,7 +297,7 @@ def test_mean_capacitance_at_its_limits():
 
 
 @given(voltages, st.floats(0.01, 10), st.floats(0.01, 10), built_ins, gradings)
-@settings(max_examples=50, deadline=None)
+@examples(50)
 def test_mean_capacitance_adds_up_and_lies_between_its_ends(low, first, second, phi, m):
     middle, high = low + first, low + first + second
     whole = junction.mean_capacitance(1.0, low, high, phi, m)
@@ -335,7 +336,7 @@ def test_detector_of_a_square_pixel():
 
 
 @given(widths, st.floats(0, 10), st.floats(0, 200))
-@settings(max_examples=50, deadline=None)
+@examples(50)
 def test_nothing_is_left_of_the_smallest_pixel(feature, border, transistors):
     least = pd.smallest_square_pixel(feature, border, transistors)
     roundings = 1e-14 * least**2

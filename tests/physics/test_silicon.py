@@ -11,7 +11,8 @@ from pathlib import Path
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 
 from vcam_cli.physics import silicon
@@ -126,7 +127,7 @@ SILICON = st.tuples(positive, positive, positive, positive, positive)
 
 
 @given(SILICON)
-@settings(max_examples=150, deadline=None)
+@examples(150)
 def test_collected_as_printed(given):
     f, a, ln, w, d = given
     assert silicon.collection_efficiency(f, a, ln, w, d) == pytest.approx(
@@ -135,7 +136,7 @@ def test_collected_as_printed(given):
 
 
 @given(SILICON, st.integers(-40, 40))
-@settings(max_examples=50, deadline=None)
+@examples(50)
 def test_collected_knows_no_unit_of_length(given, power):
     """Scaled by a power of two every intermediate number is the same."""
     f, a, ln, w, d = given
@@ -146,7 +147,7 @@ def test_collected_knows_no_unit_of_length(given, power):
 
 
 @given(SILICON)
-@settings(max_examples=50, deadline=None)
+@examples(50)
 def test_mtf_falls_from_one_to_the_part_of_the_depletion_region(given):
     _, a, ln, w, d = given
     f = np.concatenate([[0], np.geomspace(1e-4, 1e15, 300)])

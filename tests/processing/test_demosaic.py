@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from demosaiced import bilinear
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -89,7 +90,7 @@ def test_planes_follow_the_order_of_the_colors_asked_for():
     np.testing.assert_array_equal(forward, backward[::-1])
 
 
-@settings(max_examples=50, deadline=None)
+@examples(50)
 @given(
     mosaic=arrays(np.float32, (6, 5), elements=st.floats(-1000, 1000, width=32)),
     order=st.sampled_from(ORDERS),

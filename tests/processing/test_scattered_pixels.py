@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.processing.layouts import LAYOUTS, RGB, Layout, centered, honeycomb, moved, square
@@ -97,7 +98,7 @@ def test_a_sample_in_the_middle_of_a_pixel_is_kept():
     np.testing.assert_allclose(kept, values, atol=1e-6)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(st.integers(1, 12), st.integers(0, 10**6), st.floats(1e-9, 1e9), st.floats(0, 30))
 def test_any_samples_give_weights_that_add_up_to_one(count, seed, unit, far):
     """However few, together on a line or at one place, however far: and they stay bounded."""

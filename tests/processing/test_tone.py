@@ -3,7 +3,8 @@
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 
 from vcam_cli.processing import tone
@@ -71,7 +72,7 @@ def test_curves_too_steep_for_a_table_use_the_formula(curve):
     np.testing.assert_array_equal(tone.encode(light, curve, 8), tone.codes(light, curve, 8))
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(
     st.lists(st.floats(-0.5, 1.5, width=32), min_size=2, max_size=20),
     st.sampled_from(CURVES),

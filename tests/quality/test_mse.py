@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -99,7 +100,7 @@ def test_nan_is_not_hidden():
     assert math.isnan(psnr_db(broken, np.zeros((70, 3))))
 
 
-@settings(max_examples=50, deadline=None)
+@examples(50)
 @given(PICTURES, PICTURES)
 def test_symmetric_and_zero_only_for_equal_pictures(a, b):
     assert mse(a, b) == mse(b, a) >= 0
@@ -107,7 +108,7 @@ def test_symmetric_and_zero_only_for_equal_pictures(a, b):
     assert (mse(a, b) == 0) == bool(np.array_equal(a, b))
 
 
-@settings(max_examples=50, deadline=None)
+@examples(50)
 @given(PICTURES, PICTURES, st.sampled_from([0.25, 0.5, 2.0, 8.0]))
 def test_scales_with_the_square(a, b, factor):
     # powers of two scale exactly
@@ -117,7 +118,7 @@ def test_scales_with_the_square(a, b, factor):
         assert abs(change) < 1e-4  # products in float32 may lose their last bits near zero
 
 
-@settings(max_examples=50, deadline=None)
+@examples(50)
 @given(PICTURES, PICTURES)
 def test_the_order_of_pixels_does_not_matter(a, b):
     # the order of a float64 sum

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 
 from vcam_cli.scheduling import estimators
@@ -14,7 +15,7 @@ def covariance(rate, times, read, reset):
     return rate * np.minimum.outer(times, times) + read * np.eye(len(times)) + reset
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(
     st.lists(st.floats(1e-4, 1.0), min_size=1, max_size=7, unique=True),
     st.floats(1e2, 1e6),

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 
 from vcam_cli.scheduling.comparison_schedules import (
@@ -55,7 +56,7 @@ def exact_counts(shares, count):
     return counts
 
 
-@settings(max_examples=150, deadline=None)
+@examples(150)
 @given(st.lists(st.integers(1, 40), min_size=1, max_size=6), st.integers(1, 200))
 def test_counts_are_those_of_exact_arithmetic(shares, count):
     """Small whole shares have many ties; normalized they are all off by rounding errors."""
@@ -63,7 +64,7 @@ def test_counts_are_those_of_exact_arithmetic(shares, count):
     assert captures_per_segment(probability, count) == exact_counts(shares, count)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(
     st.lists(st.floats(1e-12, 1.0), min_size=1, max_size=6),
     st.lists(st.floats(1e-8, 1.0), min_size=12, max_size=12, unique=True),

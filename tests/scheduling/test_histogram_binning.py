@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from examples import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -102,7 +103,7 @@ ordinary = st.lists(st.integers(0, 10**6), min_size=1, max_size=14).filter(any)
 huge = st.lists(st.integers(0, 20).map(lambda n: n * 2**60), min_size=2, max_size=8).filter(any)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(small | ordinary, st.integers(1, 5))
 def test_equal_bins(counts, segments):
     check(equal(counts), counts, [1] * len(counts), segments)

@@ -6,7 +6,8 @@ from pathlib import Path
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from examples import examples
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from vcam_cli.scheduling import objective
@@ -31,7 +32,7 @@ def plain(levels, weights, times, sensor):
     return total
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(
     st.one_of(st.just(0.0), st.floats(1e-9, 1e4)),
     st.floats(1e-12, 1e4),
@@ -66,7 +67,7 @@ def test_the_mean_over_a_piece_is_that_of_the_primitive(low, width, noise):
     )
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(
     st.lists(st.integers(0, 40), min_size=1, max_size=12, unique=True),
     st.lists(st.integers(1, 40), min_size=1, max_size=5),

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 
 from vcam_cli.scheduling.pdf import Pdf
@@ -44,7 +45,7 @@ def test_a_histogram_is_its_segments():
     assert pdf.high.tolist() == [1, 3]
 
 
-@settings(max_examples=50, deadline=None)
+@examples(50)
 @given(st.lists(st.tuples(st.floats(0.01, 5), st.floats(0, 1)), min_size=1, max_size=6))
 def test_moments_are_the_integrals_of_the_density(parts):
     widths, weights = np.array(parts).T

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from examples import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -124,7 +125,7 @@ def test_uniform_above_0_is_the_recurrence_too():
         assert ratios[:-1] == pytest.approx((1 + ratios[1:] ** 2) / 2, rel=1e-9)
 
 
-@settings(max_examples=120, deadline=None)
+@examples(120)
 @given(level_sets(), st.integers(1, 7))
 def test_levels_agree_with_all_subsets(levels, count):
     values, weights = levels
@@ -136,7 +137,7 @@ def test_levels_agree_with_all_subsets(levels, count):
     assert schedule.photocurrents == pytest.approx(filled, rel=1e-14)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(segment_sets(), st.integers(1, 8), st.integers(0, 2**32 - 1))
 def test_no_random_schedule_beats_the_optimum(pdf, count, seed):
     schedule = optimal_schedules(pdf, [count])[count]

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from every import every
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 
 from vcam_cli.scheduling.comparison_schedules import (
@@ -60,7 +61,7 @@ def test_one_and_two_captures(rule):
 
 
 @pytest.mark.parametrize("rule", RULES)
-@settings(max_examples=50, deadline=None)
+@examples(50)
 @given(st.floats(1e-9, 1e3), st.floats(1e-9, 1e3), st.integers(1, 50))
 def test_every_schedule_rises_to_the_longest_time(rule, t1, longest, count):
     found = RULES[rule](t1, longest, count)

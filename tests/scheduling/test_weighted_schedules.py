@@ -144,7 +144,7 @@ def test_independent_values(case):
 @pytest.mark.parametrize(
     ("sensor", "limits"),
     [
-        (Sensor(20000, 0, 100, 200), Constraints()),
+        pytest.param(Sensor(20000, 0, 100, 200), Constraints(), marks=pytest.mark.long),
         (Sensor(20000, 20, 0, 100), Constraints()),
         (LOW_LIGHT, Constraints(min_gap=1.0)),
         (LOW_LIGHT, Constraints(min_gap=1.0, frame_time=0.25)),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from image_formation.test_rate_cache import BASE, CHANGES, changed
 from layered_reference import write_exr
-from making import camera
+from making import camera, long_except
 
 from vcam_cli import simulate
 from vcam_cli.simulation.exposures import exposures, share_light
@@ -16,7 +16,17 @@ DIM = {"scene.radiance": "0.001 W/(sr m2)", "effects": "all"}
 """A scene that fills no pixel, so that no exposure asks for more exact light than another."""
 
 
-@pytest.mark.parametrize("path", [path for path in CHANGES if path != "effects"])
+QUICK = (
+    *("seed", "adc", "exposure", "processing", "pixel.defects", "pixel.crosstalk", "pixel.lag"),
+    *("pixel.readout.telegraph_noise", "pixel.readout.charge_transfer", "pixel.readout.gains"),
+    *("pixel.phase_detection", "pixel.photodetector.dark_current", "accuracy.shot_noise"),
+)
+"""One of each kind: draws, patterns, charge that moves or stays, readouts, settings."""
+
+
+@pytest.mark.parametrize(
+    "path", long_except(QUICK, [path for path in CHANGES if path != "effects"])
+)
 def test_each_is_the_camera_alone(tmp_path, path):
     """For every key that is behind the light, before and behind the camera without it."""
     before = {k: v for k, v in changed(path, 0).items() if k != path}
