@@ -238,7 +238,11 @@ def test_the_focus_is_at_the_scene_unless_it_is_given(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "pattern", ["bayer-grbg", {"block": [["B", "R", "G"], ["R", "G", "G"], ["G", "B", "R"]]}]
+    "pattern",
+    [
+        pytest.param("bayer-grbg", marks=pytest.mark.long),
+        {"block": [["B", "R", "G"], ["R", "G", "G"], ["G", "B", "R"]]},
+    ],
 )
 def test_a_mosaic_has_what_pixels_of_all_colors_have_of_its_own(pattern, tmp_path):
     """Layers are composed in each pixel's own color, wherever their windows begin."""

@@ -137,10 +137,10 @@ def test_values_lie_between_their_ends(name):
     mix = rng.uniform(0, 1, (2, len(reflectances()) if chart is card else 1))
     x, y = (np.sort(rng.uniform(-30e-6, 30e-6, (2, 20)), axis=0) for _ in range(2))
     low, high = chart.value_ends((x[0], x[1]), (y[0], y[1]), mix)
-    parts = np.linspace(0.001, 0.999, 101)
+    parts = np.linspace(0.001, 0.999, 51)
     along = (x[0][:, None] + (x[1] - x[0])[:, None] * parts).ravel()
     down = (y[0][:, None] + (y[1] - y[0])[:, None] * parts).ravel()
-    values = chart.values(along, down, mix).reshape(2, 20, 101, 20, 101)
+    values = chart.values(along, down, mix).reshape(2, 20, 51, 20, 51)
     assert (values.min(axis=(2, 4)) >= low - 1e-12).all()
     assert (values.max(axis=(2, 4)) <= high + 1e-12).all()
     assert np.mean(np.abs(values.min(axis=(2, 4)) - low) < 1e-12) > 0.9

@@ -309,7 +309,7 @@ def test_rays_of_defocus_fill_a_disk():
 @pytest.mark.parametrize(
     "terms",
     [
-        ((11, 1e-6),),
+        pytest.param(((11, 1e-6),), marks=pytest.mark.long),
         ((8, 1e-6), (5, 3e-7), (2, 4e-7)),
         pytest.param(((9, 2e-6),), marks=pytest.mark.long),
     ],
