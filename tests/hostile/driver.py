@@ -13,6 +13,7 @@ it is used would not be there in a fork. A fork that hangs tells where, and ends
 
 import contextlib
 import faulthandler
+import gc
 import importlib
 import json
 import os
@@ -205,5 +206,6 @@ def _used() -> list[str]:
 
 if __name__ == "__main__":
     _load(Path(sys.argv[1]))
+    gc.freeze()  # a fork that collects garbage copies the memory of all that is loaded
     for line in sys.stdin:
         print(json.dumps(answers(json.loads(line))), flush=True)
