@@ -147,7 +147,7 @@ def test_workers_do_not_change_a_byte(source, monkeypatch):
     assert chart.planes(mix, workers=3).tobytes() == chart.planes(mix).tobytes()
 
 
-@pytest.mark.parametrize("source", [LEAVES, BOTH])
+@pytest.mark.parametrize("source", [LEAVES, pytest.param(BOTH, marks=pytest.mark.long)])
 def test_leaves_that_are_left_out_would_not_be_seen(source):
     # Cells fine enough that leaves are looked through first; rounding of sums in another order.
     chart = sampled(source, rows=120, columns=160, oversampling=7, margin=3)

@@ -376,7 +376,7 @@ def test_off_leaves_out_that_one_alone(name, tmp_path):
     described = EVERYTHING if name in IN_EVERYTHING else CAMERAS[other]
     small = {"array.rows": 12, "array.columns": 16, "accuracy": "draft"}
     chosen = described | small | {"effects": {name: "off"}}
-    found = decisions(simulate(camera(tmp_path, chosen)))
+    found = {d.name: d for d in prepare(camera(tmp_path, chosen))[0].plan.decisions}
     assert (found[name].state, found[name].by) == ("off", "user")
     assert {d.name for d in found.values() if d.state == "off" and d.by == "user"} == {name}
 
