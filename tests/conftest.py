@@ -23,7 +23,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 # Arrays of tests lie in memory that a worker keeps: to ask the system for pages, and to give them
-# back, for each takes 5 to 10 % of the time of tests of the engine. A process reads this when it
+# back, for each takes 4 to 11 % of the time of tests of the engine. A process reads this when it
 # starts, so that workers have it of the process that starts them; the commands that tests start,
 # some of whose peaks of memory are judged, do without.
 KEPT_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(1 << 25), "MALLOC_TRIM_THRESHOLD_": str(1 << 31)}
