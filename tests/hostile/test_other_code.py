@@ -118,7 +118,7 @@ def test_changes_before_the_hash_is_first_needed(tmp_path, change):
     """A process that was loaded from other files than those on the disk has no hash."""
     copy = tmp_path / "vcam_cli"
     copy.mkdir()
-    for name in ("__init__.py", "errors.py", "source_code.py"):
+    for name in ("__init__.py", "errors.py", "records.py", "source_code.py"):
         shutil.copy2(PACKAGE / name, copy)
     env = os.environ | {"PYTHONPATH": str(tmp_path)}
     line = [sys.executable, "-c", LATE]
