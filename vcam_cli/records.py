@@ -1,14 +1,14 @@
 """Frozen dataclasses, made in a fifth of the time.
 
 The standard library writes six methods of each class as text and compiles them, 0.5 ms a class;
-`vcam run` imports three hundred. Here it writes `__init__` alone. The others are the same
-functions for all classes.
+`vcam run` imports three hundred. Here it writes `__init__` alone. The others are closures, or the
+same functions for all classes.
 """
 
 import dataclasses
 from collections.abc import Callable
 from dataclasses import FrozenInstanceError
-from functools import cache, partial
+from functools import partial
 from operator import attrgetter
 from reprlib import recursive_repr
 from typing import TYPE_CHECKING, Any
@@ -42,7 +42,7 @@ else:
             return dataclasses.dataclass(cls, eq=eq, **more)
         own = set(vars(cls))
         dataclasses.dataclass(cls, eq=False, repr=False, **more)
-        for name, method in (METHODS | COMPARISON if eq else METHODS).items():
+        for name, method in (METHODS | _comparison(cls) if eq else METHODS).items():
             if name not in own:
                 setattr(cls, name, method)
         return cls
@@ -66,34 +66,28 @@ def _repr(self: Any) -> str:
     return f"{type(self).__qualname__}({values})"
 
 
-@cache
-def _compared(cls: Any) -> Callable[[Any], object]:
-    """Return what takes from an object of a class the values that are compared."""
-    return _getter([f.name for f in dataclasses.fields(cls) if f.compare])
-
-
-@cache
-def _hashed(cls: Any) -> Callable[[Any], object]:
+def _comparison(cls: Any) -> dict[str, Callable[..., Any]]:
+    """Return the methods that compare and hash objects of a class by their values."""
     fields = dataclasses.fields(cls)
-    return _getter([f.name for f in fields if (f.compare if f.hash is None else f.hash)])
+    compared = _getter([f.name for f in fields if f.compare])
+    hashed = _getter([f.name for f in fields if (f.compare if f.hash is None else f.hash)])
+
+    def equal(self: Any, other: Any) -> Any:
+        if other.__class__ is not self.__class__:
+            return NotImplemented
+        return compared(self) == compared(other)
+
+    def own_hash(self: Any) -> int:
+        return hash(hashed(self))
+
+    return {"__eq__": equal, "__hash__": own_hash}
 
 
 def _getter(names: list[str]) -> Callable[[Any], object]:
+    """Return what takes some values from an object."""
     if len(names) > 1:
         return attrgetter(*names)
     return lambda self: tuple(getattr(self, name) for name in names)
 
 
-def _eq(self: Any, other: Any) -> Any:
-    if other.__class__ is not self.__class__:
-        return NotImplemented
-    values = _compared(self.__class__)
-    return values(self) == values(other)
-
-
-def _hash(self: Any) -> int:
-    return hash(_hashed(self.__class__)(self))
-
-
 METHODS = {"__setattr__": _set, "__delattr__": _delete, "__repr__": _repr}
-COMPARISON = {"__eq__": _eq, "__hash__": _hash}

@@ -227,7 +227,8 @@ class _SceneVariances:
         rates = [charge.rate() for charge in of_kind(gone, Charge)]
         if missing := math.fsum(rates) * self.signal.time:
             # Without a charge the dark signal and every level are lower, for all that is kept.
-            kept = [effect for effect in self.present if effect not in gone]
+            names = {effect.name for effect in gone}
+            kept = [effect for effect in self.present if effect.name not in names]
             lost = self.whole - _of_scopes([*kept, *instead], self._signal_without(missing))
         else:
             lost = _of_scopes(gone, self.signal) - _of_scopes(instead, self.signal)

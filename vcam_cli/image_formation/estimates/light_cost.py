@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import astuple, field, replace
+from functools import cached_property
 
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import Effect, of_kind
@@ -245,10 +246,6 @@ def _spline_seconds(colors: int, report: SpectrumReport) -> float:
     return (EVALUATE + SPLINE) * report.fine_pixels * colors if report.sub_exposures else 0.0
 
 
-MAKE_IMAGES = Blur, SeparableTransfer, FieldTransfer, Warp
-"""Kinds of effects on which the time of an image depends."""
-
-
 @dataclass(frozen=True)
 class LightCost:
     """What light through some of a path's effects costs, before it is computed."""
@@ -257,9 +254,18 @@ class LightCost:
     """Lens, pixels and settings."""
     scene: AnyScene
     """The scene, flat."""
-    _images: dict[tuple[Effect, ...], tuple[float, bool]] = field(default_factory=dict)
-    """Effects that blur -> seconds of the image that they make, and whether it has a spectrum, of
-    those requested before."""
+    _images: dict[tuple[str, ...], tuple[float, bool]] = field(default_factory=dict)
+    """Names of effects that blur -> seconds of the image that they make, and whether it has a
+    spectrum, of those requested before."""
+
+    @cached_property
+    def _blurs(self) -> tuple[Effect, ...]:
+        """Effects on which the time of the image depends.
+
+        Waves need their transfer at their own frequencies alone, no table of it.
+        """
+        tabulated = () if isinstance(self.scene, WAVES) else (Blur, SeparableTransfer)
+        return of_kind(self.path.effects, FieldTransfer, Warp, *tabulated)
 
     def saved(self, omitted: Collection[Effect]) -> float:
         """Return the time that leaving out some effects saves.
@@ -276,27 +282,26 @@ class LightCost:
         """
         pixels = self.path.geometry.rows * self.path.geometry.columns
         gains = sum(effect.pixel_seconds for effect in omitted) * pixels
-        if not of_kind(omitted, *MAKE_IMAGES):  # the image is the same, whatever it takes
+        names = {effect.name for effect in omitted}
+        kept = tuple(blur for blur in self._blurs if blur.name not in names)
+        if len(kept) == len(self._blurs):  # the image is the same, whatever it takes
             return gains
-        blurs = of_kind(self.path.effects, *MAKE_IMAGES)
-        kept = tuple(blur for blur in blurs if blur not in omitted)
-        return gains + self._image(blurs)[0] - self._image(kept)[0]
+        return gains + self._image(self._blurs)[0] - self._image(kept)[0]
 
     @property
     def of_all(self) -> float:
         """Time of the image with every effect, if it has a spectrum; else 0 [core seconds]."""
-        seconds, has_spectrum = self._image(of_kind(self.path.effects, *MAKE_IMAGES))
+        seconds, has_spectrum = self._image(self._blurs)
         return seconds if has_spectrum else 0.0
 
     def _image(self, blurs: tuple[Effect, ...]) -> tuple[float, bool]:
-        if blurs not in self._images:
-            self._images[blurs] = self._image_seconds(blurs)
-        return self._images[blurs]
+        names = tuple(blur.name for blur in blurs)
+        if names not in self._images:
+            self._images[names] = self._image_seconds(blurs)
+        return self._images[names]
 
     def _image_seconds(self, blurs: Sequence[Effect]) -> tuple[float, bool]:
-        # Waves need their transfer at their own frequencies alone, no table of it; those of a blur
-        # over the field are in `FIELD`.
-        every = () if isinstance(self.scene, WAVES) else of_kind(blurs, Blur)
+        every = of_kind(blurs, Blur)  # tables of a blur over the field are in `FIELD`
         computed = of_kind(every, GeometricTransfer)
         tabulated = [blur for blur in every if blur not in computed]
         lines = len(tabulated) + (DIRECTED - 1) * len(of_kind(tabulated, PlaneTransfer))
