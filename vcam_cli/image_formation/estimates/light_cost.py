@@ -39,7 +39,7 @@ from vcam_cli.scenes.waves import WaveScene
 
 FIXED = 0.6e-3
 """What does not depend on the size of a frame's light [s]."""
-SPECTRUM = 12e-3
+SPECTRUM = 11e-3
 """The same where it has a spectrum: tables of the transfer function, edges of a chart [s]."""
 FAR_PART = 1.7e-3
 """The same of each ring of a far field [s]."""
@@ -106,16 +106,16 @@ edges need fewer modes."""
 FIELD = 0.035
 """Finding the modes of a blur over the field up to the Nyquist frequency of the pixels, and by its
 square up to another [s]."""
-SHEARED = 1.4
+SHEARED = 1.3
 """Cost of pixels whose rows see the scene at other places over that of others."""
 ENTRIES_OF_PLANE = 150
 """Entries along an axis of a table over fx and fy, about."""
 WARPED_CELLS, COLOR_GROUPS = 6, 4
 """Cells of a warped chart per pixel, and wavelengths at which a warp by color is followed, as often
 as not."""
-BEYOND, BEYOND_PARALLEL = 1.15, 1.03
-"""Where the spectrum of a chart ends over where that of edges anywhere would, as often as not, and
-that of parallel edges."""
+BEYOND = 1.15
+"""Where the spectrum of a chart ends over where that of edges anywhere would, as often as not; that
+of parallel edges ends there."""
 FIRST = 0.65
 """Cost of light that is formed once more, being darker than assumed, over that of its last image:
 the brighter light may err by more, which takes fewer terms and modes (0.62 to 0.73)."""
@@ -343,7 +343,7 @@ def expected_report(
     if profile and not path.field:
         return SpectrumReport(edges=len(profile.places))
     planes = min(PLANES, len(path.transfer.weights))
-    beyond = BEYOND_PARALLEL if profile else BEYOND
+    beyond = 1.0 if profile else BEYOND
     found = _sampled(path, scene, planes, beyond, with_memory)
     directed = bool(path.transfer.plane_blurs)
     modes = MODES_OF_EDGES if profile else MODES
