@@ -112,7 +112,7 @@ class OpticalPath:
         OpticalPath
             The path.
         """
-        gone = {effect.name for effect in self.effects if effect not in kept}
+        gone = {effect.name for effect in self.effects} - {effect.name for effect in kept}
         return replace(
             self,
             transfer=self.transfer.with_effects(kept),

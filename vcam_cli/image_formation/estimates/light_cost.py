@@ -336,10 +336,12 @@ def expected_report(
         waves = scene.waves_that_vary if isinstance(scene, WaveScene) else 1
         has_field = bool(of_kind(effects, FieldTransfer))
         return SpectrumReport(waves=waves, has_field=has_field)
+    profile = scene.chart.profile() if isinstance(scene, ChartScene) else None
+    if profile and of_kind(effects, Blur) and not of_kind(effects, FieldTransfer):
+        return SpectrumReport(edges=len(profile.places))
     path = path.with_effects(effects)
     if not path.transfer.effects and not path.field and path.averages_over_box:
         return _averaged(path, scene)
-    profile = scene.chart.profile() if isinstance(scene, ChartScene) else None
     if profile and not path.field:
         return SpectrumReport(edges=len(profile.places))
     planes = min(PLANES, len(path.transfer.weights))
