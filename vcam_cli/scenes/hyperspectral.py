@@ -97,9 +97,17 @@ class StoredSamples:
         workers : int, optional
             Number of threads.
         """
+        return READER + workers * 2 * self._strip_bytes
+
+    @property
+    def kept_bytes(self) -> int:
+        """What the heap keeps when strips are freed: twice the largest, by the GNU C library."""
+        return 2 * self._strip_bytes
+
+    @property
+    def _strip_bytes(self) -> int:
         rows, columns, bands = self.shape
-        strip = min(rows, ROWS) * columns * bands * self.dtype.itemsize
-        return READER + workers * 2 * int(strip)
+        return int(min(rows, ROWS) * columns * bands * self.dtype.itemsize)
 
     def __len__(self) -> int:
         return self.shape[0]

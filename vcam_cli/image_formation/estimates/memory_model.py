@@ -285,7 +285,7 @@ def _samples(path: OpticalPath, scene: SampledScene, highest: float, planes: int
 def _painting_bytes(path: OpticalPath, scene: SampledScene, values: int) -> tuple[int, int]:
     """Memory of bands of cells while they are painted, with `values` bytes a cell, and then."""
     if isinstance(scene, CubeScene) and isinstance(scene.picture, StoredSamples):
-        return scene.picture.reading_bytes(path.workers), 0
+        return scene.picture.reading_bytes(path.workers), scene.picture.kept_bytes
     if not (isinstance(scene, ChartScene) and scene.is_painted):
         return 0, 0
     rows, columns = scene.shape
