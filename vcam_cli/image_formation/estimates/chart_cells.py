@@ -214,8 +214,7 @@ class CellError:
         error : float
             Rms error [e/s].
         """
-        f, _ = self._table
-        passed = self._squared_transfer(f, np.zeros_like(f))
+        (f, _), (passed, _) = self._table, self._passed_across
         across = 2 * passed / np.square(2 * np.pi * (f + 1e-9 * f[-1]))
         steps = (across[1:] + across[:-1]) / 2 * np.diff(f)
         beyond = (self.energy.aligned + self.energy.oblique) * steps[::-1].cumsum()[::-1]
