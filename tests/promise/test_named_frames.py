@@ -36,6 +36,7 @@ import pytest
         pytest.param("layers", "200076", marks=pytest.mark.long),
         # 1.02 T: of 20 pixels two sums differed by little; its truth takes 3 s
         pytest.param("layers", "100039", marks=pytest.mark.long),
+        ("lone", "801797"),  # 1.62 times the variance: a level 18 e higher than its light said
         ("lone", "630033"),  # 1.07 T: a lens was read in the middle of blocks of its spectrum
     ],
 )

@@ -50,6 +50,11 @@ MOST_TRIED = 8
 """Effects on electrons whose subsets are all tried; of more, those that change least."""
 
 
+SURE = 10
+"""Signal levels over what light may err by, above which that is neglected: variances follow squares
+of the level at most, and keep a fifth of what they may change by."""
+
+
 @dataclass(frozen=True)
 class Decision:
     """What becomes of one effect."""
@@ -135,7 +140,7 @@ def make(
     known = {name: min(c * signal.time / signal.full_signal, 1.0) for name, c in changes.items()}
     left_out = {effect.name: light.shares[effect.name] for effect in light.omitted}
     shares = light.shares | known | left_out
-    variances = _SceneVariances(present, with_lower_levels(signal, tolerance), tolerance)
+    variances = _SceneVariances(present, with_levels_around(signal, tolerance), tolerance)
     omitted = {*light.omitted, *_negligible(effects, variances, light, shares)}
     on = tuple(effect for effect in present if effect not in omitted)
     active, idle = _without_idle_draws(effects, on, tuple(omitted), variances)
@@ -146,15 +151,18 @@ def make(
     return Plan(tuple(decisions), active, settings, seconds, memory_bytes, levels=signal.levels)
 
 
-def with_lower_levels(signal: SignalLevels, tolerance: float) -> SignalLevels:
-    """Return a signal with every level, and with each as low as the light's error lets it be.
+def with_levels_around(signal: SignalLevels, tolerance: float) -> SignalLevels:
+    """Return a signal with every level, and with low ones as low and as high as they may truly be.
 
     Levels are percentiles of light that errs by the tolerance, relative to full signal; relative
-    to a low one that is much. None is below the dark signal.
+    to a low one that is much: shot noise may count there that would not. None is below the dark
+    signal, or above full signal.
     """
-    off = tolerance * signal.full_signal
-    lower = (max(level - off, min(level, signal.dark)) for level in signal.levels)
-    return replace(signal, levels=tuple(sorted({*signal.levels, *lower})))
+    off, dark, full = tolerance * signal.full_signal, signal.dark, signal.full_signal
+    low = [level for level in signal.levels if level < SURE * off]
+    least = (max(level - off, min(level, dark)) for level in low)
+    most = (min(level + off, max(level, full)) for level in low)
+    return replace(signal, levels=tuple(sorted({*least, *signal.levels, *most})))
 
 
 def _negligible(
