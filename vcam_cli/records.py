@@ -42,7 +42,7 @@ else:
             return dataclasses.dataclass(cls, eq=eq, **more)
         own = set(vars(cls))
         dataclasses.dataclass(cls, eq=False, repr=False, **more)
-        for name, method in (METHODS | _comparison(cls) if eq else METHODS).items():
+        for name, method in (METHODS | _comparison_methods(cls) if eq else METHODS).items():
             if name not in own:
                 setattr(cls, name, method)
         return cls
@@ -66,7 +66,7 @@ def _repr(self: Any) -> str:
     return f"{type(self).__qualname__}({values})"
 
 
-def _comparison(cls: Any) -> dict[str, Callable[..., Any]]:
+def _comparison_methods(cls: Any) -> dict[str, Callable[..., Any]]:
     """Return the methods that compare and hash objects of a class by their values."""
     fields = dataclasses.fields(cls)
     compared = _getter([f.name for f in fields if f.compare])

@@ -14,7 +14,7 @@ from vcam_cli.effects.pixel_signal import Charge
 from vcam_cli.effects.signal_chain import NoiseSource
 from vcam_cli.errors import BadInput
 from vcam_cli.simulation.checks import check_effects
-from vcam_cli.simulation.plan import Decision, with_levels_around
+from vcam_cli.simulation.plan import Decision, with_level_errors
 from vcam_cli.simulation.simulate import prepare
 from vcam_cli.solve.solved import solve
 
@@ -578,6 +578,6 @@ def test_the_pixel_is_weighed_behind_a_lens_with_a_direction(tmp_path):
 def test_levels_may_be_others_than_the_light_says():
     """Low ones, by the tolerance of full signal; none below the dark signal, nor raised to it."""
     signal = SignalLevels(full_signal=1000.0, time=0.01, dark=5.0, levels=(3.0, 10.0, 500.0))
-    assert with_levels_around(signal, 0.02).levels == (3.0, 5.0, 10.0, 23.0, 30.0, 500.0)
-    assert with_levels_around(signal, 0.06).levels[-2:] == (500.0, 560.0)
-    assert with_levels_around(signal, 0.6).levels[-1] == 1000.0
+    assert with_level_errors(signal, 0.02).levels == (3.0, 5.0, 10.0, 23.0, 30.0, 500.0)
+    assert with_level_errors(signal, 0.06).levels[-2:] == (500.0, 560.0)
+    assert with_level_errors(signal, 0.6).levels[-1] == 1000.0

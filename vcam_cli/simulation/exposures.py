@@ -20,9 +20,9 @@ from vcam_cli.simulation.run import Run
 from vcam_cli.simulation.scene_files import flattened
 from vcam_cli.simulation.scene_light import (
     exposed_as,
-    filled_in,
     formed_light,
     rate_of_full,
+    scene_for_exposure,
     scene_light,
 )
 from vcam_cli.simulation.shared import Shared
@@ -72,7 +72,7 @@ def exposures(
         path = replace(seen.path, effects=each.effects.mean_signal)
         own = replace(seen, solved=each, path=path)
         lit, exposed = light, expose(own, light, False)
-        better = filled_in(exposed.settings.time, exposed.settings.gain, own, light, picture)
+        better = scene_for_exposure(exposed.settings, own, light, picture)
         if better is not own:
             own, lit = formed_light(better, picture, run)
             exposed = expose(own, lit, False)

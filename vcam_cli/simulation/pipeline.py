@@ -39,7 +39,7 @@ from vcam_cli.simulation.preparation import Prepared, plan_frame, whole_frame
 from vcam_cli.simulation.reading import read_camera
 from vcam_cli.simulation.run import Run
 from vcam_cli.simulation.scene_files import ScenePicture, flattened
-from vcam_cli.simulation.scene_light import filled_in, formed_light, scene_light
+from vcam_cli.simulation.scene_light import formed_light, scene_for_exposure, scene_light
 from vcam_cli.simulation.shared import Shared
 from vcam_cli.solve.solved import Solved
 
@@ -134,9 +134,10 @@ def _prepare(solved: Solved, picture: ScenePicture, run: Run, is_planned: bool =
         exposed = expose(seen, light, is_planned)
         if not is_planned:
             return whole_frame(seen, light, exposed)
-        chosen = exposed.settings
-        better = filled_in(chosen.time, chosen.gain, seen, light, picture)
+        better = scene_for_exposure(exposed.settings, seen, light, picture)
     if better is not seen:
+        once = cost_model.light_seconds(solved.layout, light.spectrum, run.workers)
+        run = run.after(once, lights=1)
         seen, light = formed_light(better, picture, run)
         with run.stages("exposure"):
             exposed = expose(seen, light)

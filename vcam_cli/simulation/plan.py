@@ -50,7 +50,7 @@ MOST_TRIED = 8
 """Effects on electrons whose subsets are all tried; of more, those that change least."""
 
 
-SURE = 10
+WELL_KNOWN = 10
 """Signal levels over what light may err by, above which that is neglected: variances follow squares
 of the level at most, and keep a fifth of what they may change by."""
 
@@ -140,7 +140,7 @@ def make(
     known = {name: min(c * signal.time / signal.full_signal, 1.0) for name, c in changes.items()}
     left_out = {effect.name: light.shares[effect.name] for effect in light.omitted}
     shares = light.shares | known | left_out
-    variances = _SceneVariances(present, with_levels_around(signal, tolerance), tolerance)
+    variances = _SceneVariances(present, with_level_errors(signal, tolerance), tolerance)
     omitted = {*light.omitted, *_negligible(effects, variances, light, shares)}
     on = tuple(effect for effect in present if effect not in omitted)
     active, idle = _without_idle_draws(effects, on, tuple(omitted), variances)
@@ -151,7 +151,7 @@ def make(
     return Plan(tuple(decisions), active, settings, seconds, memory_bytes, levels=signal.levels)
 
 
-def with_levels_around(signal: SignalLevels, tolerance: float) -> SignalLevels:
+def with_level_errors(signal: SignalLevels, tolerance: float) -> SignalLevels:
     """Return a signal with every level, and with low ones as low and as high as they may truly be.
 
     Levels are percentiles of light that errs by the tolerance, relative to full signal; relative
@@ -159,7 +159,7 @@ def with_levels_around(signal: SignalLevels, tolerance: float) -> SignalLevels:
     signal, or above full signal.
     """
     off, dark, full = tolerance * signal.full_signal, signal.dark, signal.full_signal
-    low = [level for level in signal.levels if level < SURE * off]
+    low = [level for level in signal.levels if level < WELL_KNOWN * off]
     least = (max(level - off, min(level, dark)) for level in low)
     most = (min(level + off, max(level, full)) for level in low)
     return replace(signal, levels=tuple(sorted({*least, *signal.levels, *most})))

@@ -274,8 +274,11 @@ def _with_full_signal(full: float, seen: SceneLight, light: photon_rate.Rate) ->
     return replace(seen, path=replace(path, full=full), light_key=f"{seen.light_key} {full}")
 
 
-def filled_in(
-    time: float, gain: float, seen: SceneLight, light: photon_rate.Rate, picture: ScenePicture
+def scene_for_exposure(
+    chosen: auto_exposure.ExposureSettings,
+    seen: SceneLight,
+    light: photon_rate.Rate,
+    picture: ScenePicture,
 ) -> SceneLight:
     """Return the scene as it is to be formed for the time that an automatic exposure chose.
 
@@ -284,10 +287,8 @@ def filled_in(
 
     Parameters
     ----------
-    time : float
-        Time that was chosen [s].
-    gain : float
-        Gain that was chosen, without unit.
+    chosen : ExposureSettings
+        The time and the gain.
     seen : SceneLight
         The scene before its camera.
     light : Rate
@@ -303,7 +304,8 @@ def filled_in(
     solved = seen.solved
     if not solved.exposure.is_timed_by_scene:
         return seen
-    timed = solved.at_gain(gain).with_exposure(solved.exposure.single(time, gain))
+    single = solved.exposure.single(chosen.time, chosen.gain)
+    timed = solved.at_gain(chosen.gain).with_exposure(single)
     better = exposed_as(seen, timed, picture)
     full, judged = (_largest_signal(each, light.values) for each in (better, seen))
     if full >= judged:
