@@ -304,10 +304,13 @@ def scene_for_exposure(
     solved = seen.solved
     if not solved.exposure.is_timed_by_scene:
         return seen
-    single = solved.exposure.single(chosen.time, chosen.gain)
-    timed = solved.at_gain(chosen.gain).with_exposure(single)
+    judged, timed = _largest_signal(seen, light.values), solved.at_gain(chosen.gain)
+    charge = judged * chosen.time * solved.layout.binning_groups.summed_charges
+    if charge <= timed.electrical.saturation:  # no pixel is full
+        return seen
+    timed = timed.with_exposure(solved.exposure.single(chosen.time, chosen.gain))
     better = exposed_as(seen, timed, picture)
-    full, judged = (_largest_signal(each, light.values) for each in (better, seen))
+    full = _largest_signal(better, light.values)
     if full >= judged:
         return seen
     omitted = replace(seen.path, omitted_share=light.plan.share * judged / full)
