@@ -19,6 +19,7 @@ import pytest
         ("array", "200509"),  # black: no time is long enough for an automatic exposure
         ("field", "80012"),  # 1.2 T: few places on a stretch of the field
         ("depth", "100034"),  # variance: dark light was 2 % of full signal too high
+        ("depth", "901537"),  # 1.3 T at reference: cover below 0 was cut off, its light was not
         ("depth", "200511"),  # 1.7 T: smooth light, whose shares of layers have detail
         ("lone", "80400"),  # 1.1 T: one pixel may lose more than all places do on average
         ("chart", "100096"),  # 1.1 T: an edge lies alike to all cells, and to all pixels, along it

@@ -143,6 +143,8 @@ def _with_place_error(path: OpticalPath, report: SpectrumReport) -> SpectrumRepo
     """Return the report with what a blur of the field errs by between its places."""
     count = path.settings.field_zones
     error = path.field.place_error(count) if path.field else 0.0
+    if not error:  # the peak of layers is not known
+        return report
     # detail is at most half as strong as light from 0 to the peak
     return replace(report, lost_rms=math.hypot(report.lost_rms, error * report.peak / 2))
 

@@ -91,7 +91,8 @@ def cut_image(
         light, cover = both
         level = own.transfer.level[-1, len(light) :, None, None]
         cover /= np.where(level > 0, level, 1.0).astype(cover.dtype)
-        return light, np.clip(cover, 0, 1, out=cover)
+        # What is below 0 is a part of the sum over layers, as the light is that belongs to it.
+        return light, np.minimum(cover, 1, out=cover)
 
     g = path.geometry
     pixels = Pixels(replace(path, is_mosaic=False), Window(slice(0, g.rows), slice(0, g.columns)))
