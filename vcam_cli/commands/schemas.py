@@ -4,7 +4,7 @@ A schema says less than `vcam validate`: which keys exclude each other, and what
 arithmetic, is checked there.
 """
 
-from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.camera import STUDIES, Camera
 from vcam_cli.camera.sensor.technology import Technology
 from vcam_cli.capture_schedules.model import ScheduleStudy
 from vcam_cli.config.key_index import Key, keys
@@ -18,7 +18,7 @@ from vcam_cli.config.schema import (
 )
 from vcam_cli.datasets.model import Dataset
 from vcam_cli.lenses.table import LensTable
-from vcam_cli.sweeps.model import KINDS, Case, Sweep
+from vcam_cli.sweeps.model import Case, Sweep
 from vcam_cli.verification.model import Measurement
 
 SECTIONS = {"scene": "Scene", "optics": "Optics", "pixel": "Pixel", "array": "Array"}
@@ -73,7 +73,7 @@ def _study_schema() -> Schema:
     either: Schema = {
         "$defs": definitions,
         "type": "object",
-        "properties": {"kind": {"enum": [*KINDS, "dataset"]}},
+        "properties": {"kind": {"enum": list(STUDIES)}},
         **_choice("schedule", ScheduleStudy, _choice("dataset", Dataset, _schema_reference(Sweep))),
     }
     return file_schema(either, "a study file")

@@ -48,8 +48,6 @@ VARIANCE_SHARE = 0.8
 
 MOST_TRIED = 8
 """Effects on electrons whose subsets are all tried; of more, those that change least."""
-
-
 WELL_KNOWN = 10
 """Signal levels over what light may err by, above which that is neglected: variances follow squares
 of the level at most, and keep a fifth of what they may change by."""

@@ -268,10 +268,18 @@ def _with_full_signal(full: float, seen: SceneLight, light: photon_rate.Rate) ->
     known = full * (1 + path.settings.tolerance)  # no better than by what light may err
     if full == 0 or known >= min(alone, path.full):  # and by these
         return seen
-    omitted = replace(path, omitted_share=light.plan.share * alone / full)
-    if light.spectrum.lost_rms < omitted.usable_error * full:
+    if _is_exact(light, path, alone, full):
         return seen
     return replace(seen, path=replace(path, full=full), light_key=f"{seen.light_key} {full}")
+
+
+def _is_exact(light: photon_rate.Rate, path: OpticalPath, judged: float, full: float) -> bool:
+    """Return whether light errs by less than a full signal allows.
+
+    `judged` is the higher one by which it was formed [e/s].
+    """
+    omitted = replace(path, omitted_share=light.plan.share * judged / full)
+    return light.spectrum.lost_rms < omitted.usable_error * full
 
 
 def scene_for_exposure(
@@ -311,10 +319,7 @@ def scene_for_exposure(
     timed = timed.with_exposure(solved.exposure.single(chosen.time, chosen.gain))
     better = exposed_as(seen, timed, picture)
     full = _largest_signal(better, light.values)
-    if full >= judged:
-        return seen
-    omitted = replace(seen.path, omitted_share=light.plan.share * judged / full)
-    if light.spectrum.lost_rms <= omitted.usable_error * full:
+    if full >= judged or _is_exact(light, seen.path, judged, full):
         return seen
     return replace(better, solved=solved, light_key=f"{seen.light_key} {better.path.ceiling}")
 
