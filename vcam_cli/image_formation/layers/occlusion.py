@@ -30,6 +30,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -113,6 +114,7 @@ class RayLayer:
         return np.asarray(within + u * self.radius - t * self.path - self.place)
 
 
+@lru_cache(1 << 5)  # windows of all places and sizes have the same
 def rays(count: int, kind: int, opening: Opening = CIRCLE) -> Array:
     """Return rays (n, 5): a point of the aperture [radii], an instant and a place, 0 to 1.
 
@@ -140,7 +142,9 @@ def rays(count: int, kind: int, opening: Opening = CIRCLE) -> Array:
     radius, angle = np.sqrt(k / count), 2 * np.pi * TURNS[kind] * k
     rest = np.outer(k, STEPS[kind]) % 1
     x, y = radius * np.cos(angle), radius * np.sin(angle)
-    return np.column_stack([x, y, rest])[opening.contains(x, y)]
+    found = np.column_stack([x, y, rest])[opening.contains(x, y)]
+    found.setflags(write=False)
+    return found
 
 
 def front_to_back(layers: Sequence[Planes]) -> Array:

@@ -221,7 +221,7 @@ class SharpImage:
         blurs = (*lens, *of_kind(behind, Blur))
         self._transfer = Transfer(path.transfer.wavelengths, white, blurs)
         self._known: ByteCache[Array] = ByteCache(KNOWN)
-        self._tables: dict[tuple[float, float], tuple[Array, Array]] = {}
+        self._tables: dict[tuple[float, float], tuple[float, Array]] = {}
 
     @property
     def diffracts(self) -> bool:
@@ -243,9 +243,9 @@ class SharpImage:
         Returns
         -------
         list of Array
-            Groups (k, 5); one of all without diffraction.
+            Groups (k, 5); one of all where there is one part of the pupil, or no diffraction.
         """
-        if self._lens is None:
+        if self._lens is None or rings * sectors == 1:
             return [rays]
         x, y = rays[:, 0], rays[:, 1]
         ring = (rings * (x**2 + y**2)).astype(int)
@@ -437,23 +437,28 @@ class SharpImage:
         if self._transfer.plane_blurs:
             response: Array = self._transfer.plane_response(fx, fy)[0]
             return response.astype(kind)
-        lengths, known = self._radial(cells.sides)
+        top, known = self._radial(cells.sides)
         half = len(fy) // 2 + 1  # the other half has the same lengths, in reverse
         found: Array = np.empty((len(known), len(fy), len(fx)), kind)
-        length = np.sqrt(np.add(np.square(fx), np.square(fy[:half, None])))
-        for plane, one in zip(found, known, strict=True):
-            plane[:half] = np.interp(length, lengths, one)
+        place = np.sqrt(np.add(np.square(fx), np.square(fy[:half, None]))) * ((ENTRIES - 1) / top)
+        first = np.minimum(place.astype(np.intp), ENTRIES - 2)
+        beyond: Array = (place - first).astype(kind)
+        for plane, one in zip(found, known.astype(kind), strict=True):
+            here = plane[:half]
+            np.multiply(np.diff(one).take(first), beyond, out=here)
+            here += one.take(first)
             plane[half:] = plane[len(fy) - half : 0 : -1]
         return found
 
-    def _radial(self, sides: tuple[float, float]) -> tuple[Array, Array]:
-        """Return frequencies (n,), up to the highest on cells [cycles/m], and the response there.
+    def _radial(self, sides: tuple[float, float]) -> tuple[float, Array]:
+        """Return the highest frequency on cells [cycles/m], and the response (C, n) up to it [e/s].
 
-        It is (C, n) [e/s].
+        It is at even steps from 0.
         """
         if sides not in self._tables:
-            lengths = np.linspace(0, math.hypot(0.5 / sides[0], 0.5 / sides[1]), ENTRIES)
-            self._tables[sides] = lengths, self._transfer.radial_response(lengths)[0]
+            top = math.hypot(0.5 / sides[0], 0.5 / sides[1])
+            lengths = np.linspace(0, top, ENTRIES)
+            self._tables[sides] = top, self._transfer.radial_response(lengths)[0]
         return self._tables[sides]
 
 
