@@ -207,6 +207,17 @@ def test_tilt_moves_the_image():
     np.testing.assert_allclose(both, coma * np.exp(-2j * np.pi * fx * 4 * N * c), atol=1e-12)
 
 
+@pytest.mark.parametrize("rest", [(), ((4, 3e-7),), ((8, 1e-7),)])
+def test_tilt_moves_what_rays_bring(rest):
+    """By the slope of each direction, of a round blur and of one with a direction."""
+    fx, fy = np.array([0.0, 0.1, 0.2]) * CUTOFF, np.array([-0.15, 0.05]) * CUTOFF
+    right, down = 3e-7, -5e-7
+    still = ray_blur.otf(fx, fy, N, rest)
+    moved = ray_blur.otf(fx, fy, N, ((2, right), (3, down), *rest))
+    waves = fx * 4 * N * right + fy[:, None] * 4 * N * down
+    np.testing.assert_allclose(moved, still * np.exp(-2j * np.pi * waves), atol=1e-12)
+
+
 def test_coma_throws_its_tail_the_way_its_outer_rays_go():
     """The center of gravity of the light is that of the rays, to the right for a positive Z_8."""
     c, f = 0.05 * LAMBDA, 1e-4 * CUTOFF

@@ -69,14 +69,29 @@ def test_light_is_formed_once_for_the_camera_that_fills_first(tmp_path):
     assert np.sqrt(np.mean(error**2)) <= tolerance
 
 
-def test_pixels_that_an_automatic_time_fills_get_light_as_exact_as_alone(tmp_path):
-    """Their mean is low: few are so bright that they fill sooner than the white would."""
+def few_bright(folder):
+    """Changes for a picture of which a hundredth is bright."""
     few = np.full((48, 48), 0.002, np.float32)
     few[20:23, 20:23] = 1
-    scene = {"kind": "image", "file": write_exr(tmp_path / "few.exr", few)}
+    scene = {"kind": "image", "file": write_exr(folder / "few.exr", few)}
+    return {"scene.source": scene, "effects": "all", "array.rows": 16, "array.columns": 16}
+
+
+def test_light_is_as_exact_as_the_longest_time_asks(tmp_path):
+    """Where it fills the pixels and the others do not, errors count over less light."""
+    times = ("1 ms", "5 s")
+    cameras = [camera(tmp_path, few_bright(tmp_path) | {"exposure": {"time": t}}) for t in times]
+    short, long = (simulate(made, 1, shared=Shared()).frame.spectrum for made in cameras)
+    assert long.oversampling > short.oversampling
+    for each in exposures(cameras, 1, Shared()):
+        assert each.frame.spectrum == replace(long, changes={})
+
+
+def test_pixels_that_an_automatic_time_fills_get_light_as_exact_as_alone(tmp_path):
+    """Their mean is low: few are so bright that they fill sooner than the white would."""
     auto = {"auto": {"method": "mean", "target": 0.3, "max": "10 s"}}
-    changes = {"scene.source": scene, "exposure": auto, "effects": "all"}
-    made = camera(tmp_path, changes | {"array.rows": 16, "array.columns": 16})
+    changes = few_bright(tmp_path) | {"exposure": auto}
+    made = camera(tmp_path, changes)
     alone = simulate(made, 1, shared=Shared())
     [found] = exposures([made], 1, Shared())
     assert found.dn.tobytes() == alone.dn.tobytes()

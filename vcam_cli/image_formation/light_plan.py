@@ -43,8 +43,9 @@ OMITTED_SHARE = 0.5
 """Part of the mean's tolerance for all effects that are left out; those on electrons may use what
 those on the light leave of it."""
 LEVEL_SHARE = 0.5
-"""Part of the tolerance by which they may shift the light of any pixel, relative to it: shot noise
-has the variance of the signal, and is promised at percentiles of the light."""
+"""Part of the tolerance by which a gain may change the light of any pixel, relative to it: shot
+noise has the variance of the signal, and is promised at percentiles of the light. What spreads
+light is judged by what it adds to the darkest pixel."""
 PERCENTILES = (1, 10, 50, 90, 99)
 """Percentiles of the scene's own light at which noise is promised."""
 PLACES = 33
@@ -258,10 +259,9 @@ def _share(path: OpticalPath, scene: AnyScene, effect: Effect) -> float:
     """Return a bound on what a gain, glare, sharing or transport changes; inf for none."""
     gains = of_kind([effect], Gain)
     share = _mean_error_of_gain(gains[0]) if gains else _mean_error(effect)
-    allowed = LEVEL_SHARE * path.settings.tolerance
     for gain in gains:
         low, high = _range_of_gains(path, (gain,))
-        if max(abs(1 - low), abs(1 - high)) > allowed:  # of some pixel's light
+        if max(abs(1 - low), abs(1 - high)) > LEVEL_SHARE * path.settings.tolerance:
             return math.inf
     spread = [glare.fraction for glare in of_kind([effect], VeilingGlare)]
     shared = of_kind([effect], NeighborSharing)
@@ -279,9 +279,7 @@ def _share(path: OpticalPath, scene: AnyScene, effect: Effect) -> float:
         low, high = _range_of_gains(path, of_kind(before, Gain))
         darkest, brightest = _range_of_light(scene)
         least, moved = low * darkest, fraction * (high * brightest - low * darkest)
-        share = 0.0 if moved == 0 else moved / least if least > 0 else math.inf
-        if share > allowed:  # of the darkest pixel's light
-            return math.inf
+        share = 0.0 if moved == 0 else moved / least if least > 0 else math.inf  # of the darkest
     return share
 
 
