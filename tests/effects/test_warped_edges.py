@@ -135,7 +135,7 @@ def test_squares_are_interpolated_as_scipy_does(planes):
     row, column = (rng.uniform(BEYOND, n - 2 - BEYOND, (60, 70)) for n in cells.shape[1:])
     squares = sum(cells[:, i : i + 239, k : k + 249] for i in (0, 1) for k in (0, 1)) / 4
     expected = [ndimage.map_coordinates(s, (row, column), mode="mirror") for s in squares]
-    spline = warped._spline(cells)
+    spline = warped._spline_across(warped._spline_down(cells))
     found = warped._interpolated(spline, row.ravel(), column.ravel())
     np.testing.assert_allclose(found.reshape(np.shape(expected)), expected, atol=1e-12)
     light, varies = warped._even_light(cells, row, column, 0.7)

@@ -69,9 +69,11 @@ LOOKS, LOOKS_IN_TILE = 33, 5
 """Places along each side of a map, and of a tile, at which its scale is looked at."""
 TINY = 1e-30
 """Less than any second moment that counts."""
-IN_USE, OF_PLACE = 4.5, 100
-"""Arrays of a tile's painted cells in use at once, those of blocks for half, and temporary arrays
-of each place that looks there [bytes]."""
+IN_USE, OF_PLACE = 2, 80
+"""Arrays of a tile's painted cells in use at once, and what tells of each place that looks there
+where it looks, with two squares about it [bytes]."""
+INTERPOLATED = 3_000_000
+"""Temporary arrays of `AT_ONCE` places: weights, where they count, and the library's [bytes]."""
 CORNERS = ((-1, -1), (-1, 1), (1, -1), (1, 1))
 """Signs of the ways to four squares."""
 PAIRS = ((0, 0), (1, 1), (0, 1))
@@ -286,9 +288,13 @@ class WarpedChart(Chart):
 
     def painting_bytes(self, cells: PaintedCells) -> int:
         """Return the memory of temporary arrays of a thread: those of a tile."""
-        tile = self._tile_cells(cells)
-        own = IN_USE * tile.values * tile.count + OF_PLACE * tile.count / FINER**2
-        return round(max(own, tile.values * tile.count + self.chart.painting_bytes(tile)))
+        tile, parts = self._tile_cells(cells), self._parts(cells.pitch)
+        painted = tile.values * tile.count
+        places = math.prod(min(TILE, parts * n) for n in cells.shape)
+        interpolated = painted + 2 * tile.values * places + INTERPOLATED
+        work = max(IN_USE * painted, interpolated)
+        held = (OF_PLACE + tile.values) * places
+        return max(held + work, painted + self.chart.painting_bytes(tile))
 
     def kept_bytes(self, cells: PaintedCells) -> int:
         """Return the memory of what the chart keeps of all tiles, and of the library of splines."""
@@ -374,12 +380,16 @@ class WarpedChart(Chart):
         out, varies = _even_light(planes, row, column, farthest)
         if not varies.any():
             return out
-        spline = _spline(planes)
-        found: Array = np.zeros(1, planes.dtype)
+        lines = _spline_down(planes)
+        del planes  # two arrays as large as the tile are in use at once, not three
+        spline = _spline_across(lines)
+        del lines
+        found: Array = np.zeros((len(out), int(varies.sum())), out.dtype)
         for way in ways:
             across, down = (w / grid.pitch for w, grid in zip(way, grids, strict=True))
-            found = found + _interpolated(spline, (row + down)[varies], (column + across)[varies])
-        out[:, varies] = found / len(ways)
+            found += _interpolated(spline, (row + down)[varies], (column + across)[varies])
+        found /= len(ways)
+        out[:, varies] = found
         return out
 
     def _halved_tile(
@@ -529,25 +539,34 @@ def _of_blocks(planes: Array, pick: np.ufunc) -> Array:
     return planes
 
 
-def _spline(planes: Array) -> Array:
-    """Return the coefficients (nx, ny, R) of the cubic spline through the means over squares.
+def _spline_down(planes: Array) -> Array:
+    """Return the coefficients (ny, R, nx), along y, of the splines through means over cells.
 
-    They are `FINER` cells (R, ny, nx) along each side, one at every cell.
+    The means are over `FINER` cells down, of `planes` (R, ny + FINER - 1, nx), one at every cell.
     """
-    ny, nx = (count - FINER + 1 for count in planes.shape[1:])
+    ny = planes.shape[1] - FINER + 1
     down = planes[:, :ny].swapaxes(0, 1).copy()
     for k in range(1, FINER):
         down += planes[:, k : k + ny].swapaxes(0, 1)
     down *= 6 / FINER
     _sharpen(down)
-    means = down[..., :nx].copy()
-    for k in range(1, FINER):
-        means += down[..., k : k + nx]
-    means *= 6 / FINER
-    out: Array = np.empty((nx, ny, len(planes)), planes.dtype)
-    lines, turned = means.reshape(-1, nx), out.reshape(nx, -1)
+    return down
+
+
+def _spline_across(down: Array) -> Array:
+    """Return the coefficients (nx, ny, R) of the cubic spline through the means over squares.
+
+    `down` (ny, R, nx + FINER - 1) are those along y.
+    """
+    ny, count, nx = down.shape[0], down.shape[1], down.shape[2] - FINER + 1
+    out: Array = np.empty((nx, ny, count), down.dtype)
+    lines, turned = down.reshape(ny * count, -1), out.reshape(nx, -1)
     for some in pieces(len(lines), IN_CACHE):
-        turned[:, some] = lines[some].T
+        means = lines[some, :nx].copy()
+        for k in range(1, FINER):
+            means += lines[some, k : k + nx]
+        means *= 6 / FINER
+        turned[:, some] = means.T
     _sharpen(out)
     return out
 
