@@ -13,8 +13,11 @@ from dataclasses import fields
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.parallel import pieces
 from vcam_cli.records import dataclass
 
+AT_ONCE = 1 << 11
+"""Cells whose edges are looked at together."""
 MOST = 5
 """Divisions of a cell that several edges cross, at most."""
 UNDIVIDED, DIVIDED = 0.0042, 0.3
@@ -137,30 +140,30 @@ class EdgeShares:
         yield single, self.back, 1 - self.inside
         yield several[self.cell], self.label, self.weight
 
-    def colors(self, color: Array) -> Array:
-        """Return the average color of every cell.
+    def colors(self, color: Array) -> Iterator[Array]:
+        """Yield the average color of every cell, plane by plane.
 
         Parameters
         ----------
         color : Array
             Color (R, labels) of the ground and of every disc.
 
-        Returns
-        -------
+        Yields
+        ------
         Array
-            Averages (R, m), in the unit of `color`.
+            Averages (m,) of a plane, in the unit of `color`; overwritten with the next one.
         """
-        out = np.empty((len(color), len(self.single)))
+        plane = np.empty(len(self.single))
         # Numbers are kept in few bits; indexing converts them each time.
         single, several = np.flatnonzero(self.single), np.flatnonzero(~self.single)
         front, back, cell, label = (
             numbers.astype(np.intp) for numbers in (self.front, self.back, self.cell, self.label)
         )
         behind = 1 - self.inside
-        for plane, row in zip(out, color, strict=True):
+        for row in color:
             plane[single] = row.take(front) * self.inside + row.take(back) * behind
             plane[several] = np.bincount(cell, row.take(label) * self.weight, len(several))
-        return out
+            yield plane
 
 
 def edge_shares(discs: Discs, cells: CrossedCells, divided: int = MOST) -> EdgeShares:
@@ -184,22 +187,29 @@ def edge_shares(discs: Discs, cells: CrossedCells, divided: int = MOST) -> EdgeS
     single = ~several
     pair = np.repeat(several, cells.count)
     front, back = cells.front[~pair], cells.back[single]
-    inside = cover(discs, front - 1, cells.box[:, single])
-    cell = label = np.zeros(0, np.intp)
-    weight = np.zeros(0)
-    if several.any():
-        number = np.arange(int(several.sum()))
+    inside = np.empty(len(front))
+    number = np.flatnonzero(single)
+    for some in pieces(len(front), AT_ONCE):
+        inside[some] = cover(discs, front[some] - 1, cells.box[:, number[some]])
+    labels, cells_type = (np.min_scalar_type(count + 1) for count in (len(discs), len(single)))
+    number, fronts = np.flatnonzero(several), cells.front[pair]
+    count = cells.count[number]
+    ends = np.concatenate([[0], np.cumsum(count)])
+    found = [(np.zeros(0, cells_type), np.zeros(0, labels), np.zeros(0))]
+    for some in pieces(len(number), AT_ONCE):
         parts = _Parts(
-            cells.box[:, several],
-            cells.back[several],
-            number,
-            np.repeat(number, cells.count[several]),
-            cells.front[pair],
+            cells.box[:, number[some]],
+            cells.back[number[some]],
+            np.arange(some.start, some.stop),
+            np.repeat(np.arange(some.stop - some.start), count[some]),
+            fronts[ends[some.start] : ends[some.stop]],
         )
         cell, label, weight = _resolve(discs, parts, divided)
-    labels, cells_type = (np.min_scalar_type(count + 1) for count in (len(discs), len(single)))
-    front, back, label = (numbers.astype(labels) for numbers in (front, back, label))
-    return EdgeShares(single, front, back, inside, cell.astype(cells_type), label, weight)
+        found.append((cell.astype(cells_type), label.astype(labels), weight))
+    cell, label, weight = (np.concatenate(each) for each in zip(*found, strict=True))
+    return EdgeShares(
+        single, front.astype(labels), back.astype(labels), inside, cell, label, weight
+    )
 
 
 def several_shares(count: int, cell: Array, label: Array, weight: Array) -> EdgeShares | None:

@@ -77,6 +77,7 @@ class Coverage:
         index = self.label.astype(np.intp)
         for plane, line in zip(out, color, strict=True):
             np.take(line, index, out=plane, mode="clip")
+        del index
         if self.shares is not None:
             at = self.row.astype(np.intp), self.column.astype(np.intp)
             for plane, light in zip(out, self.shares.colors(color), strict=True):
@@ -212,6 +213,7 @@ def coverage(
     if not len(cell):
         return Coverage(near, label.astype(np.min_scalar_type(len(discs) + 1)), row, column, None)
     count = np.diff(starts, append=len(cell))
+    del spans, cell  # memory for what follows
     box = np.stack([x_edges[column], x_edges[column + 1], y_edges[row], y_edges[row + 1]])
     crossed = CrossedCells(box, label[row, column], count, front)
     shares = disc_edges.edge_shares(discs, crossed, divided)
@@ -428,14 +430,15 @@ def _labels(spans: _Spans, discs: int, shape: tuple[int, int], hidden: Cells | N
 
 def _crossed_cells(spans: _Spans, label: Array) -> tuple[Array, Array]:
     """Return pairs of a cell and the label of a visible edge that crosses it, front first."""
-    row = spans.row * label.shape[1]
-    start = np.concatenate([row + spans.touch_start, row + spans.full_stop])
-    count = np.concatenate(
-        [spans.full_start - spans.touch_start, spans.touch_stop - spans.full_stop]
-    )
-    cell = concatenate_ranges(start, count)
-    front = np.repeat(np.concatenate([spans.disc, spans.disc]) + 1, count)
-    seen = np.flatnonzero(front > label.ravel()[cell])
-    key = np.sort((cell[seen] << 31) - front[seen].astype(np.int64))
+    row, keys = spans.row * label.shape[1], []
+    for start, stop in (
+        (spans.touch_start, spans.full_start),
+        (spans.full_stop, spans.touch_stop),
+    ):
+        cell = concatenate_ranges(row + start, stop - start)
+        front = np.repeat(spans.disc + 1, stop - start)
+        seen = np.flatnonzero(front > label.ravel()[cell])
+        keys.append((cell[seen] << 31) - front[seen].astype(np.int64))
+    key = np.sort(np.concatenate(keys))
     cell = -((-key) >> 31)
     return cell, (cell << 31) - key

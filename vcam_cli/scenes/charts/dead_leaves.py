@@ -67,13 +67,13 @@ an rms of 6e-5 in single cells, and of 1e-3 in those beyond, which lenses blur b
 EDGE_SECONDS = 0.035, 0.0135
 """Core seconds to find the edges that a frame sees, and more for each division of cells,
 calibrated."""
-PAINTING_BYTES = 8, 184, 258
+PAINTING_BYTES = 13, 116, 170
 """Temporary arrays of each cell, of each that an outline crosses, and of each in which two do, as
 often as it is looked at [bytes]: above those traced of ten seeds in bands of a quarter of a frame.
 Where a band has many small leaves they are twice as many as in the mean."""
 SEEN_BYTES = 2, 20, 70
 """What is kept of them of visible leaves [bytes], likewise above the 5 to 41 a cell traced."""
-PUT_TOGETHER = 1.45
+PUT_TOGETHER = 2.2
 """Temporary arrays of cells that are painted in parts, over those of the parts alone: 14 to 46 MB
 of seven seeds on cells of 1/590 to 1/145 of the frame."""
 PART_SEEN_BYTES = 30, 37
