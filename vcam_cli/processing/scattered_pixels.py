@@ -32,7 +32,8 @@ References
 
 import numpy as np
 
-from vcam_cli.processing.base import Layout, map_blocks
+from vcam_cli.parallel import each, pieces
+from vcam_cli.processing.base import Layout
 from vcam_cli.records import dataclass
 
 NEIGHBORS = 8
@@ -41,6 +42,8 @@ MAX_WEIGHT_SUM = 3.0
 """Largest sum of their weights without their signs; with them it is 1."""
 MIN_SATURATION_WEIGHT = 1e-3
 """Weight above which a sample's saturation counts."""
+AT_ONCE = 1 << 12
+"""Pixels whose samples are weighed together: 4 MB."""
 _NEAR = 1e-6  # of R: what is nearer is in the middle, what is as near to R is at R
 _FIRM = 1e-9  # of R squared: added to the spread of the samples, which may lie on a line
 
@@ -93,16 +96,16 @@ def interpolate_to_grid(
             raise ValueError(f"no sample of color {color}")
         sources.append((Samples(layout.x[here], layout.y[here]), linear[here], codes[here]))
 
-    def fill(start: int, stop: int) -> None:
-        y, x = np.meshgrid(layout.picture_y[start:stop], layout.picture_x, indexing="ij")
-        top = highest[start:stop]
+    def fill(rows: slice) -> None:
+        y, x = np.meshgrid(layout.picture_y[rows], layout.picture_x, indexing="ij")
+        top = highest[rows]
         for plane, (samples, values, measured) in zip(planes, sources, strict=True):
             index, weight = samples.weights_at(x.ravel(), y.ravel())
-            plane[start:stop] = np.einsum("ij,ij->i", weight, values[index]).reshape(y.shape)
+            plane[rows] = np.einsum("ij,ij->i", weight, values[index]).reshape(y.shape)
             counted = np.where(np.abs(weight) > MIN_SATURATION_WEIGHT, measured[index], 0)
             np.maximum(top, counted.max(axis=1).reshape(y.shape), out=top)
 
-    map_blocks(fill, grid, workers)
+    each(fill, pieces(grid[0], max(1, AT_ONCE // grid[1])), workers)
     return GriddedSamples(planes, highest)
 
 
