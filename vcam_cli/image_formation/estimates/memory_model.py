@@ -36,8 +36,8 @@ from vcam_cli.scenes.hyperspectral import CubeScene, StoredSamples
 BASE = 144_000_000
 """Interpreter and libraries of `vcam run`: 126 to 138 MB were measured before uniform scenes; few
 frames import further modules. A call of the library takes 40 MB less [bytes]."""
-LATER = 10_000_000
-"""What of it is taken behind the light: 125 to 136 MB are taken before a chart is painted
+LATER = 14_000_000
+"""What of it is taken behind the light: 121 to 127 MB are taken before a chart is painted
 [bytes]."""
 HALVES, DISPARITY = 100, 170
 """What codes of both halves of a pixel take, and writing them and their disparity beside other
@@ -132,7 +132,8 @@ def image_bytes(
             samples = (value + each) * planes * math.prod(part.shape)
         light = each * series * _series(path, part, filtered)
         filtering = _filtering_bytes(path, part, filtered, planes, (each, samples, light))
-        painting, own = _painting_bytes(path, part, min(value, each) * planes)
+        terms = samples if part is scene else 0
+        painting, own = _painting_bytes(path, part, min(value, each) * planes, terms)
         kept = own if part is scene else kept
         image = pixels * width
         if part is not scene:  # that of its own cells is there
@@ -236,7 +237,8 @@ def table_bytes(path: OpticalPath, planes: int, size: TableSize) -> tuple[int, i
     if not directed:
         return of_length + of_blurs, of_length + of_blurs
     grids = [blur.kept_bytes(light, by_harmonics=True) for blur in directed]
-    kept = min(sum(grids), GRID_CACHE_BYTES + max(grids))
+    # What the last one was made of is as large, and not given back at once.
+    kept = min(sum(grids), GRID_CACHE_BYTES + max(grids)) + max(grids)
     before = of_length + of_blurs + round(SLACK * kept)
     before += max(blur.library_bytes for blur in directed)
     return before, before + round(SLACK * _harmonic_bytes(path, planes * colors, size))
@@ -282,8 +284,13 @@ def _samples(path: OpticalPath, scene: SampledScene, highest: float, planes: int
     return 2 * (down * y.terms + along * x.terms) + planes * down * x.terms
 
 
-def _painting_bytes(path: OpticalPath, scene: SampledScene, values: int) -> tuple[int, int]:
-    """Memory of bands of cells while they are painted, with `values` bytes a cell, and then."""
+def _painting_bytes(
+    path: OpticalPath, scene: SampledScene, values: int, terms: int
+) -> tuple[int, int]:
+    """Memory of bands of cells while they are painted, with `values` bytes a cell, and then.
+
+    `terms` are the bytes of all rows' terms; those of a band are written once it is painted.
+    """
     if isinstance(scene, CubeScene) and isinstance(scene.picture, StoredSamples):
         return scene.picture.reading_bytes(path.workers), scene.picture.kept_bytes
     if not (isinstance(scene, ChartScene) and scene.is_painted):
@@ -293,6 +300,7 @@ def _painting_bytes(path: OpticalPath, scene: SampledScene, values: int) -> tupl
     pitch = max(scene.pitch_x, scene.pitch_y)
     band = PaintedCells((bands[0].stop, columns), pitch, scene.extent, values)
     of_thread = band.count * values + scene.chart.painting_bytes(band)
+    of_thread -= terms * band.shape[0] // rows
     return min(path.workers, len(bands)) * of_thread, scene.chart.kept_bytes(band)
 
 
