@@ -202,9 +202,10 @@ def _changes(uniform_transfer: Transfer, rings: Sequence[Zone], frequency: Array
             added = whole.radial_response(frequency) - uniform_transfer.radial_response(frequency)
             return added[None].astype(np.complex128)
         harmonics = np.moveaxis(directed[0].harmonics(frequency, light.wavelengths), -1, 1)
-        added = harmonics * before[:, None]
+        added = np.multiply(harmonics, before[:, None], order="C")
+        del harmonics  # both are large
         added[:, 0] -= before
-        parts = np.stack([added.real, added.imag], axis=-1)
+        parts = added.view(np.float64).reshape(*added.shape, 2)
         return np.moveaxis(light.spectral_sum(parts), 2, 0).copy().view(np.complex128)[..., 0]
 
     return [change(ring.blur) for ring in rings]
