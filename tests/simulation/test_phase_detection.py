@@ -1,6 +1,7 @@
 """Halves of pixels see halves of the lens: what is out of focus lies apart in their pictures."""
 
 import math
+import tracemalloc
 
 import numpy as np
 import OpenImageIO as oiio
@@ -10,7 +11,8 @@ from making import QUIET, camera, radiance_for
 from vcam_cli import simulate
 from vcam_cli.effects.optics.half_pupil import LEFT, RIGHT, HalfPupil
 from vcam_cli.errors import BadInput
-from vcam_cli.quality.disparity import disparity
+from vcam_cli.quality.disparity import disparity, needed_bytes
+from vcam_cli.simulation.output.phase_files import frame_disparity
 
 WAVE = {
     "scene.source": {
@@ -129,6 +131,26 @@ def test_files_of_halves(tmp_path):
     assert image.spec().channelnames == ("left", "right")
     np.testing.assert_array_equal(image.get_pixels()[..., 0], result.frame.phase_dn[0])
     assert (tmp_path / "out" / "disparity.png").is_file()
+
+
+def test_one_side_may_have_more_masked_pixels(tmp_path):
+    """Eight columns of left ones, seven of right ones."""
+    masked = {"masked": {"period": [8, 4], "offset": [3, 2]}}
+    changes = {"pixel.phase_detection": masked, "array.columns": 62, "output.phase": True}
+    result = simulate(camera(tmp_path, WAVE | changes))
+    assert [half.shape for half in result.frame.phase_dn] == [(6, 8), (6, 7)]
+    assert frame_disparity(result.frame).shape == (6, 7)
+
+
+@pytest.mark.parametrize("shape", [(240, 320), (1000, 300)])
+def test_the_disparity_takes_what_is_stated(shape):
+    left, right = np.random.default_rng(1).random((2, *shape))
+    disparity(left[:40, :40], right[:40, :40], 8)  # modules are loaded
+    tracemalloc.start()
+    disparity(left, right, 24)
+    peak = tracemalloc.get_traced_memory()[1] + left.nbytes + right.nbytes
+    tracemalloc.stop()
+    assert peak <= needed_bytes(*shape, 24) <= 1.3 * peak
 
 
 @pytest.mark.parametrize("shift", [-3.4, 0.0, 1.3, 6.0])

@@ -19,7 +19,11 @@ LEAST_DETAIL = 25.0
 """Least mean square of differences of neighbors in a window, over that of their noise, at which a
 shift can be measured: below it a window's best shift is that of its noise."""
 AT_ONCE = 1 << 20
-"""Sums of windows that are held at once, about: 8 MB."""
+"""Sums of windows that are held at once, about, without those of rows around: 8 MB."""
+IN_USE = 1.25
+"""Arrays of a band of rows in use at once, over the sums of windows among them."""
+OF_PLACE = 36
+"""What each place takes besides: both pictures, their light, the disparity [bytes]."""
 
 
 def disparity(left: Array, right: Array, most: int, noise: Array | float = 0.0) -> Array:
@@ -42,12 +46,35 @@ def disparity(left: Array, right: Array, most: int, noise: Array | float = 0.0) 
     """
     noise = np.broadcast_to(np.asarray(noise), left.shape)
     out = np.empty(left.shape)
-    band = max(AT_ONCE // (left.shape[1] * (2 * most + 3)), WINDOW)
-    for rows in slices_within(slice(0, len(out)), band):
+    for rows in slices_within(slice(0, len(out)), _rows_at_once(left.shape[1], most)):
         around = slice(max(rows.start - WINDOW, 0), rows.stop + WINDOW)
         found = _disparity(left[around], right[around], most, noise[around])
         out[rows] = found[rows.start - around.start :][: rows.stop - rows.start]
     return out
+
+
+def needed_bytes(rows: int, columns: int, most: int) -> int:
+    """Return the memory that the disparity of two pictures takes, the pictures among it.
+
+    Parameters
+    ----------
+    rows, columns : int
+        Size of the pictures.
+    most : int
+        Largest disparity that is looked for [pixels].
+
+    Returns
+    -------
+    int
+        Bytes, at least those traced.
+    """
+    band = min(_rows_at_once(columns, most) + 2 * WINDOW, rows)
+    sums = 8 * (2 * most + 3) * band * columns
+    return round(IN_USE * sums) + OF_PLACE * rows * columns
+
+
+def _rows_at_once(columns: int, most: int) -> int:
+    return max(AT_ONCE // (columns * (2 * most + 3)), WINDOW)
 
 
 def _disparity(left: Array, right: Array, most: int, noise: Array) -> Array:
@@ -56,10 +83,13 @@ def _disparity(left: Array, right: Array, most: int, noise: Array) -> Array:
 
     left, right = (np.asarray(side, float) for side in (left, right))
     shifts = np.arange(-most - 1, most + 2)
-    costs = np.array(
-        [uniform_filter(_differences(left, right, s) ** 2, WINDOW) for s in shifts.tolist()]
-    )
-    best = np.clip(costs.argmin(axis=0), 1, len(shifts) - 2)
+    costs, least = np.empty((len(shifts), *left.shape)), np.full(left.shape, np.inf)
+    best = np.zeros(left.shape, int)
+    for number, shift in enumerate(shifts.tolist()):  # `argmin` would copy all of them
+        cost = uniform_filter(_differences(left, right, shift) ** 2, WINDOW, output=costs[number])
+        best[cost < least] = number
+        np.minimum(cost, least, out=least)
+    best = np.clip(best, 1, len(shifts) - 2)
     before, least, after = (
         np.take_along_axis(costs, (best + step)[None], axis=0)[0] for step in (-1, 0, 1)
     )

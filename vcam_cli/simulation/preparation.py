@@ -197,11 +197,15 @@ def plan_frame(
         The camera, ready to take its frame.
     """
     solved = seen.solved.at_gain(exposed.settings.gain)
-    pixels, halves, written = solved.geometry.rows * solved.geometry.columns, 0, 0
+    pixels, of_halves = solved.geometry.rows * solved.geometry.columns, 0
     if exposed.halves is not None:
-        halves = half_image_bytes(pixels, False)
-        written = half_image_bytes(pixels, solved.output.phase)
-    of_light = max(light.spectrum.memory, exposed.memory) + halves
+        codes = exposure.codes_type(solved.chain.adc.bits)
+        of_halves = half_image_bytes(pixels, solved.settings, np.dtype(codes).itemsize)
+        if solved.output.phase:
+            from vcam_cli.simulation.output import phase_files
+
+            of_halves += phase_files.written_bytes(solved)
+    of_light = max(light.spectrum.memory, exposed.memory)
     decided = plan.make(
         solved.effects,
         solved.tolerance,
@@ -209,7 +213,7 @@ def plan_frame(
         solved.settings,
         exposed.light_plan,
         exposed.signal,
-        max(seen.memory + written, of_light) + seen.picture_memory,
+        max(seen.memory + of_halves, of_light) + seen.picture_memory,
         light.spectrum.changes | exposed.changes,
     )
     again = 2 if exposed.halves is not None else 0

@@ -39,9 +39,6 @@ frames import further modules. A call of the library takes 40 MB less [bytes].""
 LATER = 14_000_000
 """What of it is taken behind the light: 121 to 127 MB are taken before a chart is painted
 [bytes]."""
-HALVES, DISPARITY = 100, 170
-"""What codes of both halves of a pixel take, and writing them and their disparity beside other
-files [bytes]: 27 and 45 MB were measured for `dual-pixel`, beyond what its light takes."""
 COMPARED, COMPARED_COLOR = 35, 10
 """What comparing an image with the ideal one takes for a pixel, and for each of its colors besides
 [bytes]: 44.0 were measured of one color, 64.0 of three."""
@@ -332,22 +329,24 @@ def work_bytes(pixels: int, workers: int) -> int:
     return workers * min(WORK, WORK_OF_PIXEL * pixels)
 
 
-def half_image_bytes(pixels: int, with_disparity: bool) -> int:
-    """Return the memory of the halves of pixels, beyond what their light takes.
+def half_image_bytes(pixels: int, knobs: Settings, codes: int) -> int:
+    """Return the memory of the halves of pixels: their rates and their codes.
 
     Parameters
     ----------
     pixels : int
         Pixels of the array.
-    with_disparity : bool
-        Whether both half images and their disparity are written.
+    knobs : Settings
+        Settings of image formation.
+    codes : int
+        Memory of a code [bytes].
 
     Returns
     -------
     int
         Bytes.
     """
-    return pixels * (HALVES + DISPARITY * with_disparity)
+    return round(SLACK * 2 * pixels * (knobs.float_width // 8 + codes))
 
 
 def composed_bytes(path: OpticalPath, layers: int, rays: int) -> int:

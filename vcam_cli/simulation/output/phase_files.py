@@ -10,13 +10,38 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.files.images.exr import ExrWriter
 from vcam_cli.files.images.png import write_png
-from vcam_cli.quality.disparity import disparity
+from vcam_cli.quality.disparity import disparity, needed_bytes
 from vcam_cli.quality.error_map import false_color
 from vcam_cli.simulation.frame import Frame
 from vcam_cli.simulation.output import raw_file
+from vcam_cli.solve.solved import Solved
 
 MOST = 24
 """Largest disparity that is looked for, over the sum of a block's colors [blocks]."""
+WRITTEN = 16
+"""What writing the codes of a pixel's halves takes: both in 32 bits, and a copy [bytes]."""
+
+
+def written_bytes(solved: Solved) -> int:
+    """Return the memory that writing both files takes, one beside the other.
+
+    Parameters
+    ----------
+    solved : Solved
+        Camera whose pixels have two halves.
+
+    Returns
+    -------
+    int
+        Bytes, at least those traced.
+    """
+    rows, columns = solved.geometry.rows, solved.geometry.columns
+    phase, block = solved.pixel.phase_detection, solved.layout.raw_mosaic.block
+    height, width = len(block), len(block[0])
+    if phase is not None and phase.masked is not None:  # single pixels of either side
+        down, along = phase.masked.period
+        rows, columns, height, width = -(-rows // down), -(-columns // along), 1, 1
+    return WRITTEN * rows * columns + needed_bytes(rows // height, columns // width, MOST)
 
 
 def write_phase(path: Path, frame: Frame, config_hash: str) -> None:
@@ -67,11 +92,12 @@ def frame_disparity(frame: Frame) -> Array:
     height, width = (len(block), len(block[0])) if phase and phase.masked is None else (1, 1)
     apart = width if phase is None or phase.masked is None else 2 * phase.masked.period[1]
     left, right = (_summed(codes, height, width) for codes in frame.phase_dn)
-    columns = min(left.shape[1], right.shape[1])
+    columns = min(left.shape[1], right.shape[1])  # of masked pixels one side may have one more
+    left, right = left[:, :columns], right[:, :columns]
     count, black = height * width, frame.black_dn
-    light = np.maximum((left + right)[:, :columns] / (2 * count) - black, 0)
+    light = np.maximum((left + right) / (2 * count) - black, 0)
     variance = 2 * count * frame.chain.variance_dn(float(light.mean()) / frame.chain.system_gain)
-    found = disparity(left[:, :columns], right[:, :columns], MOST, variance)
+    found = disparity(left, right, MOST, variance)
     if phase is not None and phase.masked is not None:  # right pixels lie half a step beside left
         found = found - 0.5
     return np.asarray(found * apart)
