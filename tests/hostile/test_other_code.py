@@ -23,6 +23,12 @@ FOLDERS = sorted({name.rpartition("/")[0] for name, _ in source_code._files(PACK
 OTHER_MSE = "\n\ndef mse(*args, **more):\n    return 777.0\n"
 
 
+@pytest.fixture(autouse=True)
+def _files_as_they_are(monkeypatch):
+    """Other tests keep the list of the package's files, which change here."""
+    monkeypatch.setattr(source_code, "_files", source_code._files.__wrapped__)
+
+
 def restart(monkeypatch) -> None:
     """Let the package be loaded now."""
     monkeypatch.setattr(source_code, "STARTED", time.time_ns())
