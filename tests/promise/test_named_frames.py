@@ -17,12 +17,16 @@ import pytest
         ("array", "700303"),  # 1.07 T: light was judged by pixels, not by joined ones
         ("array", "800010"),  # 1.65 T: a mean filled pixels sooner than white let expect
         ("array", "200509"),  # black: no time is long enough for an automatic exposure
-        ("field", "80012"),  # 1.2 T: few places on a stretch of the field
-        ("depth", "100034"),  # variance: dark light was 2 % of full signal too high
+        # 1.2 T: few places on a stretch of the field; test_aberration_effect.py finds that, too
+        pytest.param("field", "80012", marks=pytest.mark.long),
+        # variance: dark light was 2 % of full signal too high; test_plan.py finds that
+        pytest.param("depth", "100034", marks=pytest.mark.long),
         ("depth", "901537"),  # 1.3 T at reference: cover below 0 was cut off, its light was not
-        ("depth", "200511"),  # 1.7 T: smooth light, whose shares of layers have detail
+        # 1.7 T: smooth light, whose shares of layers have detail; test_depth_cut.py finds that
+        pytest.param("depth", "200511", marks=pytest.mark.long),
         ("lone", "80400"),  # 1.1 T: one pixel may lose more than all places do on average
-        ("chart", "100096"),  # 1.1 T: an edge lies alike to all cells, and to all pixels, along it
+        # 1.1 T: an edge lies alike to all cells, and to all pixels, along it; test_chart_cells.py finds that
+        pytest.param("chart", "100096", marks=pytest.mark.long),
         ("moved", "100024"),  # 2.9 T: coarse samples of a spread ring beyond their grid
         ("moved", "200218"),  # lobes of coarse samples below zero: light is clipped there
         ("moved", "100068"),  # 1.1 T: their transfer ends with a jump, not along a table
@@ -46,6 +50,7 @@ def test_a_frame_keeps_every_tolerance(kind, name, tmp_path):
     assert not found.misses, found.text
 
 
+@pytest.mark.long  # quick tests of the cells that rays lie in find that, too
 def test_halves_and_thirds_of_a_pixel_do_not_agree_by_chance(tmp_path):
     """The frame above whose gaps both missed, at the tolerances that it missed."""
     found = frames.measure("layers", "100008", tmp_path, at_reference=False)
