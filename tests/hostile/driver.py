@@ -207,5 +207,6 @@ def _used() -> list[str]:
 if __name__ == "__main__":
     _load(Path(sys.argv[1]))
     gc.freeze()  # a fork that collects garbage copies the memory of all that is loaded
+    os.fsync = lambda _: None  # half of a run's time; no fork is ended by a power cut
     for line in sys.stdin:
         print(json.dumps(answers(json.loads(line))), flush=True)

@@ -1,4 +1,4 @@
-"""Harmed pictures, spectra and tables, read one after the other: `python file_fuzz.py FROM TO`.
+"""Harmed pictures, spectra and tables, read one by one: `python file_fuzz.py FROM TO STEP`.
 
 A process of its own, as a library that reads pictures may take its process with it. It tells the
 name of a file before it reads it, so that the last one told is the one it died of.
@@ -199,9 +199,9 @@ def versions(name: str, data: bytes, first: int, last: int) -> list[bytes]:
     return [*(harmed(data, random.Random(f"{name} {n}")) for n in seeds), *cuts(data, last - first)]
 
 
-def main(first: int, last: int) -> None:
-    """Harms each file in `last` - `first` ways, and cuts and misnames it; prints how many are
-    read, how many refused."""
+def main(first: int, last: int, step: int) -> None:
+    """Harms each file in `last` - `first` ways, cuts it, and gives it every so many of the others'
+    names; prints how many are read, how many refused."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     counts = {"read": 0, "refused": 0}
     with tempfile.TemporaryDirectory() as folder:
@@ -214,9 +214,10 @@ def main(first: int, last: int) -> None:
                 path.write_bytes(data)
                 counts[read_whole(path, read)] += 1
             path.write_bytes(whole[path])
-        for path, data in whole.items():
-            for other, read in readers.items():
-                if other.suffix != path.suffix:
+        names = {(path.suffix, read): path for path, read in readers.items()}
+        for number, (path, data) in enumerate(whole.items()):
+            for (suffix, read), other in list(names.items())[number % step :: step]:
+                if suffix != path.suffix:
                     named = other.with_stem("misnamed")
                     print(f"{path.name} as {named.name}", flush=True)
                     named.write_bytes(data)
@@ -236,4 +237,4 @@ def read_whole(path: Path, read: Reader) -> str:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), int(sys.argv[2]))
+    main(*map(int, sys.argv[1:]))

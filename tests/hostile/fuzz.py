@@ -107,7 +107,7 @@ def taken(camera: Camera) -> tuple[str, str]:
 
 
 @contextmanager
-def deadline(seconds: int = 0) -> Iterator[None]:
+def deadline(seconds: float = 0) -> Iterator[None]:
     """Ends what takes longer (default `LONGEST`), with TimeoutError."""
     seconds = seconds or LONGEST
 
@@ -115,11 +115,11 @@ def deadline(seconds: int = 0) -> Iterator[None]:
         raise TimeoutError(f"{seconds} s")
 
     former = signal.signal(signal.SIGALRM, ring)
-    signal.alarm(seconds)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
     try:
         yield
     finally:
-        signal.alarm(0)
+        signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, former)
 
 

@@ -108,7 +108,7 @@ def tables(folder: Path, files: dict[str, bytes], most: int = 9) -> list[str]:
 
 def test_tables_of_any_length(tmp_path):
     """Of a table that is too long no more is made than of the longest allowed."""
-    names = tables(tmp_path, {"blank.csv": b"\n" * M64, "commas.csv": b"," * M64}, 1)
+    names = tables(tmp_path, {"blank.csv": b"\n" * M64}, 1)
     names += tables(tmp_path, {"huge.csv": b""})
     os.truncate(tmp_path / "huge.csv", 50 * 10**9)  # takes no room
     said = validated(names, tmp_path)
@@ -118,6 +118,7 @@ def test_tables_of_any_length(tmp_path):
 @pytest.mark.long
 def test_more_tables_of_any_length(tmp_path):
     names = tables(tmp_path, {
+        "commas.csv": b"," * M64,
         "lines.csv": b"1\n" * (M64 // 2),
         "word.csv": b"9" * M64,
         "comments.csv": b"#\n" * (M64 // 2),

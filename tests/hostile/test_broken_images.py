@@ -28,11 +28,11 @@ pytestmark = pytest.mark.attack("pictures and spectra that are harmed")
 RGB = np.random.default_rng(7).uniform(0.1, 0.9, (20, 24, 3)).astype(np.float32)
 
 
-def fuzzed(first: int, last: int) -> tuple[int, int]:
+def fuzzed(first: int, last: int, step: int = 1) -> tuple[int, int]:
     """How many files were read and refused; a failure where one did anything else."""
     script = Path(__file__).with_name("file_fuzz.py")
     done = subprocess.run(
-        [sys.executable, "-W", "error", script, str(first), str(last)],
+        [sys.executable, "-W", "error", script, *map(str, (first, last, step))],
         env=environment(), capture_output=True, text=True, timeout=TIMEOUT,
     )  # fmt: skip
     lines = done.stdout.splitlines()
@@ -46,8 +46,8 @@ def fuzzed(first: int, last: int) -> tuple[int, int]:
 
 
 def test_harmed_files_of_every_format_are_read_or_refused():
-    """Some 700 of them; what is read is finite light."""
-    read, refused = fuzzed(0, 2)
+    """Some 700 of them, under a third of the others' names; what is read is finite light."""
+    read, refused = fuzzed(0, 2, 3)
     assert read > 100
     assert refused > 300
 

@@ -149,7 +149,14 @@ def test_a_run_that_replaces_another(number, moments, vcam, folder):
         assert results(out) == expected[seed]
 
 
-@SIGNALS
+@pytest.mark.parametrize(
+    "number",
+    [
+        pytest.param(signal.SIGINT, id="SIGINT"),
+        # That it leaves nothing half written, runs above that replace another show.
+        pytest.param(signal.SIGKILL, id="SIGKILL", marks=pytest.mark.long),
+    ],
+)
 def test_a_first_run(number, vcam, folder):
     """There was nothing before: after an interrupt not even the folder is there."""
     longest = vcam(folder, *RUN, "expected")["seconds"]

@@ -41,7 +41,7 @@ print(json.dumps({
 
 
 @pytest.mark.parametrize(
-    ("points", "early"), [(40, 15), pytest.param(500, 50, marks=pytest.mark.long)]
+    ("points", "early"), [(30, 10), pytest.param(500, 50, marks=pytest.mark.long)]
 )
 def test_a_sweep_holds_its_memory(points, early, tmp_path):
     """Every fifth frame of a width; the last width is none. The peak is read at two points."""

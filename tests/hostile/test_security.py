@@ -14,6 +14,7 @@ import pytest
 import spectral_files as made
 import yaml
 from cameras import camera, image_of, said_of, spectra_of, validated
+from making import long_except
 from processes import vcam
 from typer.testing import CliRunner
 
@@ -40,13 +41,17 @@ TEXTS = {
 }
 
 
-def test_nothing_of_a_file_is_run_and_all_is_refused(tmp_path):
+@pytest.mark.parametrize("third", long_except([0], range(3)))
+def test_nothing_of_a_file_is_run_and_all_is_refused(third, tmp_path):
+    """A third of the pairs of a value and a place, each of both in every third."""
     text = STARTER.read_text("utf-8")
     names = {}
     for i, (what, value) in enumerate((*CODE.items(), *TEXTS.items())):
         whole = value if what in CODE else json.dumps(value)
         for j, old in enumerate(("1000 cd/m2", "srgb", "starter\n")):
             assert text.count(old) == 1
+            if (i + j) % 3 != third:
+                continue
             name = names[what, old] = f"{i}-{j}.yaml"
             (tmp_path / name).write_text(text.replace(old, whole + "\n" * old.endswith("\n")))
     before = sorted(os.listdir(tmp_path))
@@ -74,7 +79,9 @@ def server():
         listening.shutdown()
 
 
-def test_nothing_is_reached_but_regular_files(tmp_path, server, monkeypatch):
+@pytest.mark.parametrize("half", long_except([0], range(2)))
+def test_nothing_is_reached_but_regular_files(half, tmp_path, server, monkeypatch):
+    """Half of the pairs of a place and a key that names it, each of both in every half."""
     address, asked = server
     secret = tmp_path / "home" / "secret.csv"
     secret.parent.mkdir()
@@ -112,6 +119,8 @@ def test_nothing_is_reached_but_regular_files(tmp_path, server, monkeypatch):
         "metrics: [snr_db]\n"
     )
     monkeypatch.setenv("HOME", str(secret.parent))
+    keys = len(names) // len(places)
+    names = [n for i, n in enumerate(names) if (i + i // keys) % 2 == half]
     said = validated([*names, "study.yaml"], tmp_path)
     assert not asked
     for name in (*names, "study.yaml"):
