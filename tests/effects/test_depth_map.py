@@ -110,11 +110,11 @@ def test_three_planes_are_three_layers(tmp_path):
 @pytest.mark.parametrize("focus", long_except([3.0], [0.5, 3.0]))
 def test_a_slope_is_a_sum_over_rays(focus, tmp_path):
     """Off by about as much as was predicted; without depth by ten times as much."""
-    light = patches(np.random.default_rng(1), 160)
+    light = patches(np.random.default_rng(1), 96)
     ends = 0.25, 2.5
-    inverse = ends[0] + (ends[1] - ends[0]) * (np.arange(160) + 0.5) / 160
+    inverse = ends[0] + (ends[1] - ends[0]) * (np.arange(96) + 0.5) / 96
     truth = slope_sum(light, ends, focus)
-    given = with_depth(tmp_path, light, np.repeat(1 / inverse[:, None], 160, axis=1), focus)
+    given = with_depth(tmp_path, light, np.repeat(1 / inverse[:, None], 96, axis=1), focus)
     found, frame = seen(tmp_path, given)
     flat, _ = seen(tmp_path, given, {"effects": STILL["effects"] | {"depth": "off"}})
     assert error(found, truth) <= 1.5 * frame.spectrum.cut.error

@@ -192,7 +192,7 @@ def test_the_power_spectrum_is_that_of_natural_images():
     # Near 1/f^2 between a few cycles a picture and the smallest leaves; images scatter between
     # -1.6 and -2.4. Six seeds gave -2.0 in the mean, with a spread of 0.14.
     slopes = []
-    for seed in (1, 2):
+    for seed in (1,):
         source = LEAVES | {"seed": seed}
         gray = build(scene(source), view(rows=256, columns=256), None).planes(np.ones((1, 12)))[0]
         window = np.hanning(256)[:, None] * np.hanning(256)
