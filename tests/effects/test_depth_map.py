@@ -228,10 +228,10 @@ def test_maps_of_few_samples(light, depth, tmp_path):
 
 def test_as_many_distances_as_pixels(tmp_path):
     """An even surface of any shape has the light of a flat one."""
-    depth = 1 / np.random.default_rng(0).uniform(0.8, 1.3, (20, 20))
-    found, frame = seen(tmp_path, with_depth(tmp_path, np.full((20, 20), 0.5), depth, 1.0))
+    depth = 1 / np.random.default_rng(0).uniform(0.8, 1.3, (12, 12))
+    found, frame = seen(tmp_path, with_depth(tmp_path, np.full((12, 12), 0.5), depth, 1.0))
     assert found == pytest.approx(0.5, abs=STANDARD)
-    light = patches(np.random.default_rng(1), 20)
+    light = patches(np.random.default_rng(1), 12)
     found, frame = seen(tmp_path, with_depth(tmp_path, light, depth, 1.0))
     assert 2 < frame.spectrum.cut.layers < 100
     assert np.isfinite(found).all()

@@ -23,7 +23,7 @@ from test_depth import FEW, RAYS, error, seen
 from vcam_cli import load, simulate
 from vcam_cli.errors import BadInput
 
-FEWER = ("array.rows=48", "array.columns=64", "quality=[]")
+FEWER = ("array.rows=24", "array.columns=32", "quality=[]")
 """A table-top on few pixels."""
 
 

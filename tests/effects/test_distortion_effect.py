@@ -249,8 +249,10 @@ def change_by(folder, changes: dict, name: str) -> float:
 
 
 def test_a_hundredth_of_a_pixel_is_left_out_by_a_bound(tmp_path):
-    k1 = -0.01 / CORNER * (FOCAL / CORNER) ** 2
+    corner = CORNER / 2
+    k1 = -0.01 / corner * (FOCAL / corner) ** 2
     changes = POINTS | WEDGE | {"optics.distortion": {"k1": k1}}
+    changes |= {"array.rows": 60, "array.columns": 80}
     found = in_plan(tmp_path, changes, "distortion")
     assert "by up to 0.01 pixels" in found["reason"]
     assert found["state"] == "off"

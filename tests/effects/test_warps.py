@@ -58,7 +58,7 @@ def distorted(z: np.ndarray) -> np.ndarray:
 
 def undistorted(z: np.ndarray) -> np.ndarray:
     found = z.astype(complex)
-    for _ in range(40):
+    for _ in range(14):  # each leaves an eighth: 1e-13
         found = found - (distorted(found) - z)
     return found
 

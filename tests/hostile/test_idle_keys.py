@@ -141,6 +141,7 @@ def changes(kind: Numeric | None, given: Any) -> Iterator[Any]:
 
 def simulated(content: dict[str, Any], folder: Path) -> Result:
     file = folder / "changed.yaml"
+    file.unlink(missing_ok=True)  # faster than to write over it
     file.write_text(json.dumps(content))
     return simulate(load(file), 1)
 

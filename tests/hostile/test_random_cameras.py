@@ -30,6 +30,7 @@ many = settings(
 
 def camera_of(tree: Tree, folder, sets=()):
     path = folder / "random.yaml"
+    path.unlink(missing_ok=True)  # faster than to write over it
     text = yaml.safe_dump(tree, sort_keys=False)
     note(text)
     path.write_text(text, encoding="utf-8")
