@@ -113,7 +113,10 @@ def test_gray_is_neutral_after_white_balance(colour, lamp, balance):
         assert np.hypot(found[:, 1], found[:, 2]).max() < 1, correction
 
 
-@pytest.mark.parametrize(("name", "gain"), [("still-life", 4.0), ("colorchecker-d65", 5.0)])
+@pytest.mark.parametrize(
+    ("name", "gain"),
+    [pytest.param("still-life", 4.0, marks=pytest.mark.long), ("colorchecker-d65", 5.0)],
+)
 def test_edge_aware_comes_closer_to_the_picture_than_bilinear(name, gain):
     """PSNR [dB] of a mosaic of the scene sampled at the pixels' centers; measured: 5.3 and 8.2."""
     from demosaiced import bilinear, edge_aware

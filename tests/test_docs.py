@@ -44,7 +44,18 @@ def test_the_commands_of_a_page_run_in_their_order(page, tmp_path, monkeypatch):
     documents.run(documents.read(page))
 
 
-@pytest.mark.parametrize("page", PAGES, ids=NAMES)
+SLOW = "docs/tutorials/patent-lens.md"
+"""It designs lenses: to trace those of its files takes seconds."""
+
+
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(p, marks=pytest.mark.long if n == SLOW else ())
+        for p, n in zip(PAGES, NAMES, strict=True)
+    ],
+    ids=NAMES,
+)
 def test_the_camera_files_of_a_page_are_valid(page, tmp_path, monkeypatch):
     """Files with a name of their own; a picture that an earlier command makes stands in."""
     monkeypatch.chdir(tmp_path)

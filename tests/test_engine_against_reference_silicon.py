@@ -311,6 +311,7 @@ def test_charge_transfer(tmp_path):
     check(Case(yaml, laser_setup, PICTURE), tmp_path)
 
 
+@pytest.mark.long
 def test_everything_together(tmp_path):
     (tmp_path / "fall.csv").write_text("image_height_mm,value\n0,1\n0.04,0.985\n0.2,0.9\n")
     optics = (

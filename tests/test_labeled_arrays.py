@@ -53,7 +53,9 @@ def test_means_of_colors(result):
     ("camera", "sets", "dims"),
     [
         ("x3-stacked", SMALL, ("y", "x", "plane")),
-        ("cfa-honeycomb", ["accuracy=draft"], ("row", "column")),
+        pytest.param(
+            *("cfa-honeycomb", ["accuracy=draft"], ("row", "column")), marks=pytest.mark.long
+        ),
     ],
 )
 def test_arrays_of_other_kinds(camera, sets, dims):

@@ -78,6 +78,7 @@ def test_a_bar_on_the_terminal_and_results_in_the_pipe(tmp_path):
     assert said.rstrip().endswith("\x1b[2K"), "the bar is wiped away at the end"
 
 
+@pytest.mark.long
 def test_json_stays_one_document_beside_the_bar(tmp_path):
     out, said = on_a_terminal(tmp_path, "--json")
     assert json.loads(out)["name"] == "small"

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from making import QUIET, camera, long_except, radiance_for
+from making import QUIET, camera, radiance_for
 
 from vcam_cli import characterize, plan, simulate
 from vcam_cli.camera.derived.geometry import geometry
@@ -296,7 +296,8 @@ def test_the_plan_tells_the_mixing_of_colors(tmp_path):
     assert "color_mixing" not in plan(camera(tmp_path, {**WALL, **BAYER})).report()
 
 
-@pytest.mark.parametrize("pattern", long_except(["monochrome"], ["monochrome", "bayer-rggb"]))
+@pytest.mark.long
+@pytest.mark.parametrize("pattern", ["monochrome", "bayer-rggb"])
 def test_the_bench_finds_the_mtf_with_crosstalk(pattern, tmp_path, monkeypatch):
     """MTF50 before a slanted edge within 1 % of the closed form, as without crosstalk; without it
     in the closed form the two differ by several times that."""

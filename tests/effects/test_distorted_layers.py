@@ -188,6 +188,7 @@ def test_what_a_lens_that_distorts_does_not_image_is_refused(change, said, tmp_p
         camera(tmp_path, given)
 
 
+@pytest.mark.long
 def test_a_flat_layer_is_the_picture_itself(tmp_path):
     """A single layer that fills the frame, and the same behind another that is beside the array."""
     scene = random_scene(np.random.default_rng(2), 2)
@@ -204,6 +205,7 @@ def test_a_flat_layer_is_the_picture_itself(tmp_path):
     assert np.sqrt(np.mean((one - two) ** 2)) <= 2e-3 * one.max()
 
 
+@pytest.mark.long
 def test_layers_seen_through_a_map_cost_the_cells_that_are_painted():
     """Each cell of each layer, whatever its planes; without a lens that distorts none."""
     for lens, painted in (["optics.distortion={k1: -0.1}"], True), ([], False):

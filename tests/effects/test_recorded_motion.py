@@ -84,7 +84,7 @@ def shake(t):
     )
 
 
-@pytest.mark.parametrize("direction", long_except(["up", "right"], [None, "down", "up", "right"]))
+@pytest.mark.parametrize("direction", long_except(["up"], [None, "down", "up", "right"]))
 @pytest.mark.parametrize("axes", long_except(["pan tilt roll"], ["pan tilt", "pan tilt roll"]))
 def test_every_line_sees_its_own_part_of_the_path(axes, direction, tmp_path):
     """Wobble: a sum over 60 instants of every line, within the error of the record's own steps."""

@@ -108,6 +108,7 @@ def test_transfer_is_a_traced_wavefronts_and_turns_with_the_azimuth():
     assert np.abs(whole - straight).max() < 1e-3
 
 
+@pytest.mark.long
 def test_rays_are_what_is_left_of_waves_in_strong_blur():
     # 400 um out of focus the blur has 90 um, of which diffraction is a small part
     sets = ("optics.defocus=400 um",)

@@ -11,7 +11,15 @@ from hard_cases.hard_case import FAR, Case, error, judge
 ALL = [case for cases in CASES.values() for case in cases]
 
 
-@pytest.mark.parametrize("case", ALL, ids=lambda case: case.name)
+LARGE = "100 million"
+"""In the names of cases that take a second; test_readme.py judges them, too."""
+
+
+@pytest.mark.parametrize(
+    "case",
+    [pytest.param(c, marks=pytest.mark.long if LARGE in c.name else ()) for c in ALL],
+    ids=lambda case: case.name,
+)
 def test_hard_case(case):
     verdict = judge(case)
     assert verdict.ours <= case.allowed, f"{case.hard}; allowed as {case.why}"

@@ -527,7 +527,7 @@ def test_no_chart_errs_by_more_beyond_its_margin(shape, f_number):
     [
         ({"chart": "siemens-star", "spokes": 2}, 24, 2.8),
         ({"chart": "siemens-star"}, 96, 1.4),
-        ({"chart": "eye-chart"}, 96, 1.4),
+        pytest.param({"chart": "eye-chart"}, 96, 1.4, marks=pytest.mark.long),
     ],
 )
 def test_charts_of_all_contrast_err_little_beyond_their_margin(

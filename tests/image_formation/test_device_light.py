@@ -66,7 +66,8 @@ def both(camera):
         ("street", ()),  # a rolling shutter in motion: every row at another place
         pytest.param("x3-stacked", (), marks=pytest.mark.long),  # every pixel with every color
         ("cfa-honeycomb", ()),
-        ("table-top", ()),  # layers in depth
+        # layers in depth, which batches of frames have, too
+        pytest.param("table-top", (), marks=pytest.mark.long),
         pytest.param("fisheye", (), marks=pytest.mark.long),  # painted through distortion
         ("starter", (ROLL,)),  # looked up by splines at instants
     ],
@@ -80,7 +81,11 @@ def test_light_is_that_of_the_processor(fake, name, sets):
 
 @pytest.mark.parametrize(
     "over",
-    [{}, {"accuracy": "reference"}, {"optics.zernike": {8: "66 nm", 11: "-25 nm"}}],
+    [
+        {},
+        {"accuracy": "reference"},
+        pytest.param({"optics.zernike": {8: "66 nm", 11: "-25 nm"}}, marks=pytest.mark.long),
+    ],
 )
 def test_photographs_on_any_grid(fake, picture, over):
     camera = load("starter", SMALL).with_(picture | over)

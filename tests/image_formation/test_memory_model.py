@@ -203,7 +203,7 @@ SHIPPED = (
 @pytest.mark.skipif(sys.platform == "win32", reason="peaks of processes are read as on POSIX")
 @pytest.mark.parametrize(
     "name",
-    [n if n == "x3-stacked" else pytest.param(n, marks=pytest.mark.long) for n in SHIPPED],
+    [n if n == "cfa-bayer" else pytest.param(n, marks=pytest.mark.long) for n in SHIPPED],
 )
 def test_the_forecast_of_a_shipped_camera_is_near_its_peak(name, tmp_path):
     forecast, peak = run_memory(name, [], tmp_path / "out")

@@ -33,6 +33,10 @@ COLORED = CSF | {"modulation": "red-green"}
 SMOOTH = [CSF, COLORED, WAVE, FLAT]
 DARK = {"kind": "chart", "chart": "dark"}
 SHARP = [WEDGE, STAR, POINTS, LETTERS, PATCHES]
+WITHOUT_LEAVES = pytest.mark.parametrize(
+    "source", [CSF, EDGE, CHECKER, pytest.param(LEAVES, marks=pytest.mark.long), BOTH, *SHARP]
+)
+"""Quick with leaves around a card, which are the same leaves."""
 EDGED = [EDGE, EDGE | {"angle": "-60 deg"}, EDGE | {"angle": "0 deg"}, CHECKER, *SHARP]
 
 
@@ -71,7 +75,7 @@ def test_averages_of_charts_with_edges(source, oversampling):
     assert abs(error).max() < 1.01 / points * brightest * mix.sum(1).max()
 
 
-@pytest.mark.parametrize("source", [LEAVES, BOTH])
+@pytest.mark.parametrize("source", [pytest.param(LEAVES, marks=pytest.mark.long), BOTH])
 def test_averages_of_dead_leaves(source):
     # Cells of 1/16 of the picture hold dozens of leaves. 64 x 64 points err by about 1e-3 where
     # many edges cross a cell, the painter by a fraction of that.
@@ -82,7 +86,7 @@ def test_averages_of_dead_leaves(source):
     assert abs(error).max() < 1e-2
 
 
-@pytest.mark.parametrize("source", [CSF, EDGE, CHECKER, LEAVES, BOTH, *SHARP])
+@WITHOUT_LEAVES
 def test_a_black_frame_around_a_scene_of_its_own_width(source):
     width = 33e-6  # of 48: the frame cuts cells in x and in y
     chart = sampled(source, margin=1, scene_width=width)
@@ -95,7 +99,7 @@ def test_a_black_frame_around_a_scene_of_its_own_width(source):
     assert planes[:, 5:9, 3].max() < 0.6 * mix.sum(1).max()
 
 
-@pytest.mark.parametrize("source", [CSF, EDGE, CHECKER, LEAVES, BOTH, *SHARP])
+@WITHOUT_LEAVES
 def test_finer_cells_average_to_coarser_ones(source):
     coarse, fine = sampled(source, margin=1), sampled(source, margin=1, oversampling=3)
     mix = mix_of(coarse)

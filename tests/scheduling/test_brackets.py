@@ -53,7 +53,7 @@ def test_value_is_that_of_merged_exposures():
 @pytest.mark.parametrize(
     ("total", "name"),
     long_except(
-        [(3.7, "uniform"), *((40.0, name) for name in CASES if name != "uniform")],
+        [(3.7, "uniform"), *((40.0, name) for name in CASES if name not in ("uniform", "noise"))],
         itertools.product([2.0, 3.7, 8.0, 40.0], CASES),
         several=True,
     ),
@@ -80,7 +80,7 @@ def test_no_times_of_a_fine_grid_are_better(name, total):
         assert found.expected_snr == pytest.approx(bracket_snr(pdf, found.times, sensor))
 
 
-@pytest.mark.parametrize("name", long_except(["levels", "noise"], CASES))
+@pytest.mark.parametrize("name", long_except(["levels"], CASES))
 def test_more_exposures_in_more_time_are_worth_more_and_stay_within_the_bound(name):
     pdf, sensor = CASES[name]
     t1 = first(pdf, sensor)

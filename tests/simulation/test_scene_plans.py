@@ -123,6 +123,7 @@ def test_the_picture_colors_what_a_plan_may_skip(tmp_path):
 
 
 @pytest.mark.draws
+@pytest.mark.long
 def test_the_picture_shows_skipped_effects_by_the_time_that_they_save(tmp_path):
     skipped = [line(state="off", saved=s, contribution=c) for s, c in ((0, 1e-3), (0, 1e-5))]
     nothing = drawn(tmp_path, skipped[0])
