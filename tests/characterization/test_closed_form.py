@@ -25,7 +25,7 @@ def test_variance_of_a_clipped_normal():
 
 
 def test_saturation_point_of_drawn_frames():
-    """The largest variance of pairs of a quarter of a million draws, unequal wells included: to 0.5 %."""
+    """The largest variance of pairs of 250,000 draws, unequal wells included: to 0.5 %."""
     rng = np.random.default_rng(4)
     pixel = rng.standard_normal(1 << 18)
     levels = np.linspace(8500, 10000, 41)

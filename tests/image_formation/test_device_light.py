@@ -104,12 +104,13 @@ def test_sums_in_closed_form_stay_with_the_processor(fake):
 
 
 def test_a_run_says_what_stays_with_the_processor(fake):
-    notes = simulate(load("still-life", SMALL), device="gpu").notes
+    star = load("starter", [*SMALL, "scene.source={kind: chart, chart: siemens-star}"])
+    notes = simulate(star, device="gpu").notes
     assert any(
         note.startswith("light, noise and readout are computed on the graphics processor; painting")
         for note in notes
     )
-    assert not any("graphics" in note for note in simulate(load("still-life", SMALL)).notes)
+    assert not any("graphics" in note for note in simulate(star).notes)
 
 
 def test_light_that_is_kept_belongs_to_its_device(fake):

@@ -25,7 +25,8 @@ import pytest
         # 1.7 T: smooth light, whose shares of layers have detail; test_depth_cut.py finds that
         pytest.param("depth", "200511", marks=pytest.mark.long),
         ("lone", "80400"),  # 1.1 T: one pixel may lose more than all places do on average
-        # 1.1 T: an edge lies alike to all cells, and to all pixels, along it; test_chart_cells.py finds that
+        # 1.1 T: an edge lies alike to all cells, and to all pixels, along it;
+        # test_chart_cells.py finds that
         pytest.param("chart", "100096", marks=pytest.mark.long),
         ("moved", "100024"),  # 2.9 T: coarse samples of a spread ring beyond their grid
         ("moved", "200218"),  # lobes of coarse samples below zero: light is clipped there
