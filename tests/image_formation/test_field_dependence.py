@@ -88,7 +88,7 @@ PRESETS = {"draft": (DRAFT, 0.02), "standard": (STANDARD, 0.005), "reference": (
 @pytest.mark.parametrize(
     ("preset", "places"),
     long_except(
-        [("standard", "even"), ("standard", "uneven")],
+        [("standard", "even"), ("standard", "steep")],
         itertools.product(PRESETS, PLACES),
         several=True,
     ),
