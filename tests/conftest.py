@@ -43,7 +43,7 @@ sys.dont_write_bytecode = False
 gc.disable()  # until all tests are collected: what is made there stays
 
 settings.register_profile("vcam", derandomize=True, database=None, deadline=None)
-settings.register_profile("quick", settings.get_profile("vcam"), max_examples=40)
+settings.register_profile("quick", settings.get_profile("vcam"), max_examples=25)
 
 
 BLANK = {"png": b"\x89PNG\r\n\x1a\n", "svg": b"<?xml", "pdf": b"%PDF"}
@@ -120,7 +120,7 @@ def is_quick(config: pytest.Config) -> bool:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Let properties hold for 40 examples where time counts, else for 100, unless a test says."""
+    """Let properties hold for 25 examples where time counts, else for 100, unless a test says."""
     settings.load_profile("quick" if is_quick(config) else "vcam")
 
 
