@@ -86,15 +86,15 @@ def test_the_raw_frame_is_that_of_whole_pixels(tmp_path):
 
 def test_half_a_disk_by_brute_force():
     """The center of gravity 4 R / (3 pi), and the transfer, by points of half a disk."""
-    radius, g = 8e-6, np.linspace(-1, 1, 1601)
+    radius, g = 8e-6, np.linspace(-1, 1, 1001)
     x, y = np.meshgrid(g, g)
     inside = (x**2 + y**2 < 1) & (x > 0)
-    fx, fy = np.array([0.0, 2e4, 9e4]), np.array([0.0, 5e4])
+    fx, fy = np.array([2e4, 9e4]), np.array([0.0, 5e4])
     for half, side in ((LEFT, 1), (RIGHT, -1)):
         found = HalfPupil(radius, half).otf_plane(fx, fy, 550e-9)
-        for i, j in np.ndindex(2, 3):
+        for i, j in np.ndindex(2, 2):
             turns = radius * (side * fx[j] * x[inside] + fy[i] * y[inside])
-            # A grid of 1600 points a side errs by a thousandth at the rim.
+            # A grid of 1000 points a side errs by a thousandth at the rim.
             assert found[i, j] == pytest.approx(np.exp(-2j * np.pi * turns).mean(), abs=2e-3)
     slight = HalfPupil(radius, LEFT).otf_plane(np.array([1e-3]), np.zeros(1), 550e-9)[0, 0]
     moved = -np.angle(slight) / (2 * np.pi * 1e-3)
