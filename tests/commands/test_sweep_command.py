@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from making import long_except, tree
+from making import tree
 from typer.testing import CliRunner
 
 from vcam_cli.commands import options, progress
@@ -175,7 +175,8 @@ def test_a_full_disk_ends_with_3(monkeypatch):
     assert "the disk is full" in one(code=3).stderr
 
 
-@pytest.mark.parametrize("workers", long_except(["1"], ["1", "2"]))
+@pytest.mark.long  # tests/hostile/test_interrupts.py interrupts sweeps
+@pytest.mark.parametrize("workers", ["1", "2"])
 def test_ctrl_c_says_that_points_are_kept(workers):
     """All points would take more than a minute: no wait for the disk outlasts them."""
     write(

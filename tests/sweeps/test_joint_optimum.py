@@ -39,7 +39,7 @@ def test_lines_through_the_best_point_miss_it():
 
 @pytest.mark.parametrize("count", long_except([4], [2, 4, 16]))
 def test_the_interval_covers_the_truth_as_often_as_it_says(count):
-    """95 % intervals, twice in 30 trials: fewer than 82 % would come about once in 1e4.
+    """95 % intervals, twice in 30 trials: fewer than 82 % would come about once in 5000.
 
     Nor is it always wide: the first-order error of ln(a) is some 2 % over sqrt(n) here.
     """

@@ -45,18 +45,18 @@ def test_the_order_of_the_values_does_not_matter():
 
 @pytest.mark.parametrize("count", long_except([4], [2, 4, 16]))
 def test_the_interval_covers_the_truth_as_often_as_it_says(count):
-    """95 % intervals in 120 trials: fewer than 85 % would come about once in 1e5.
+    """95 % intervals in 60 trials: fewer than 85 % would come about once in 1000.
 
     An interval that is always right because it is always wide is refused as well: the error of the
     mean of n curves is known to first order, sigma / (2 a sqrt(n)) at the curvature 2 a.
     """
     rng = np.random.default_rng(7)
     hits, widths = 0, []
-    for at in rng.uniform(6.5, 12, 120):
+    for at in rng.uniform(6.5, 12, 60):
         found = find_optimum(X, curve(at) + 0.02 * rng.standard_normal((count, 20)), "min")
         hits += found.low <= at <= found.high
         widths.append(found.high - found.low)
-    assert hits >= 0.85 * 120
+    assert hits >= 0.85 * 60
     assert np.median(widths) < 3 / np.sqrt(count)
 
 
@@ -127,7 +127,7 @@ def pole(x, at, slope, ripple, phase):
 
 
 def test_intervals_of_coarse_and_fine_grids_overlap():
-    """Of twenty studies at least nine in ten, and they have the truth in them as often.
+    """Of ten studies at least nine, and they have the truth in them as often.
 
     Noise is as that of the shipped study; so is the coarse grid. Without the error of the cubic in
     the interval 23 of 40 overlap, and 14 have the truth in them.
@@ -135,7 +135,7 @@ def test_intervals_of_coarse_and_fine_grids_overlap():
     rng = np.random.default_rng(11)
     fine, coarse = np.linspace(5.3, 11, 100), np.linspace(5.3, 15, 20)
     overlaps, hits, widths = 0, 0, []
-    for _ in range(20):
+    for _ in range(10):
         at, slope = rng.uniform(6.2, 8), rng.uniform(0.03, 0.1)
         found = []
         for x in (fine, coarse):
@@ -147,5 +147,5 @@ def test_intervals_of_coarse_and_fine_grids_overlap():
         hits += b.low <= at <= b.high
         widths.append(b.high - b.low)
     assert np.median(widths) < 0.4, "less than a step of the coarse grid, 0.51"
-    assert overlaps >= 18
-    assert hits >= 18
+    assert overlaps >= 9
+    assert hits >= 9

@@ -118,8 +118,10 @@ def _keys_called(word: str) -> list[tuple[str, Any]]:
         if whole:
             return whole
     whole = [(where, key) for where, key in _all_keys() if key.dotted.lower() == word]
+    if whole:
+        return whole
     ends = [(where, key) for where, key in _all_keys() if key.dotted.lower().endswith(f".{word}")]
-    return whole or [found for found in ends if found[1].path[0] != "effects"]
+    return [found for found in ends if found[1].path[0] != "effects"]
 
 
 def _of_key(where: str, key: Any) -> dict[str, Any]:
