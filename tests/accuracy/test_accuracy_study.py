@@ -310,6 +310,7 @@ def test_a_line_with_all_effects_keeps_those_off_that_the_file_switches_off(tmp_
     assert pasted.effects["read_noise"] == "on"
 
 
+@pytest.mark.long
 def test_the_recommendation_before_one_white_column_meets_its_tolerances(tmp_path):
     """A survey of some places may miss such a line, and all presets with it."""
     picture = np.zeros((64, 96), np.uint8)
