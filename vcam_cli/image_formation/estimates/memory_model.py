@@ -86,7 +86,7 @@ def image_bytes(
     planes: int,
     rings: Sequence[FarPart] = (),
     filtered: float | None = None,
-    tables: tuple[int, int] = (0, 0),
+    tables: tuple[int, int, int] = (0, 0, 0),
 ) -> int:
     """Return the memory of an image through the cosine spectrum.
 
@@ -108,7 +108,7 @@ def image_bytes(
     filtered : float, optional
         Frequency up to which the spectrum is filtered; by default the highest [pixel Nyquist].
     tables : tuple of int, optional
-        Memory of tables of transfer functions, while the scene is painted and behind that [bytes].
+        Memory of tables of transfer functions, as `table_bytes` returns it.
 
     Returns
     -------
@@ -136,8 +136,8 @@ def image_bytes(
         if part is not scene:  # that of its own cells is there
             filtering += round(SLACK * image)
         evaluated = round(SLACK * (samples + light + image))
-        painted = round(SLACK * (samples + painting)) - LATER + tables[0 if part is scene else 1]
-        formed = max(filtering, evaluated) + tables[1]
+        painted = round(SLACK * (samples + painting)) - LATER + tables[0 if part is scene else 2]
+        formed = max(max(filtering, evaluated) + tables[2], round(SLACK * samples) + tables[1])
         most = max(most, round(SLACK * max(own, kept)) + max(formed, painted))
     return BASE + most
 
@@ -197,7 +197,7 @@ def device_bytes(path: OpticalPath, scene: SampledScene, highest: float, planes:
     return held * (path.settings.float_width // 8)
 
 
-def table_bytes(path: OpticalPath, planes: int, size: TableSize) -> tuple[int, int]:
+def table_bytes(path: OpticalPath, planes: int, size: TableSize) -> tuple[int, int, int]:
     """Return the memory of tables of transfer functions, beside the image.
 
     Those of a field are made of the harmonics of all its rings once the scene is painted.
@@ -215,8 +215,9 @@ def table_bytes(path: OpticalPath, planes: int, size: TableSize) -> tuple[int, i
 
     Returns
     -------
-    before, behind : int
-        Bytes while the scene is painted, and behind that, at least those measured.
+    before, most, behind : int
+        Bytes while the scene is painted, while tables are made, and behind that, at least those
+        measured.
     """
     colors = len(path.mosaic.colors)
     of_length = _radial_bytes(path, planes, size)
@@ -232,13 +233,14 @@ def table_bytes(path: OpticalPath, planes: int, size: TableSize) -> tuple[int, i
         of_blurs += INTERPOLATION
     directed = of_kind([ring.blur for ring in path.field_rings], PlaneTransfer)
     if not directed:
-        return of_length + of_blurs, of_length + of_blurs
+        return of_length + of_blurs, of_length + of_blurs, of_length + of_blurs
     grids = [blur.kept_bytes(light, by_harmonics=True) for blur in directed]
     # What the last one was made of is as large, and not given back at once.
     kept = min(sum(grids), GRID_CACHE_BYTES + max(grids)) + max(grids)
     before = of_length + of_blurs + round(SLACK * kept)
     before += max(blur.library_bytes for blur in directed)
-    return before, before + round(SLACK * _harmonic_bytes(path, planes * colors, size))
+    most, held = _harmonic_bytes(path, planes * colors, size)
+    return before, before + round(SLACK * most), before + round(SLACK * held)
 
 
 def _radial_bytes(path: OpticalPath, planes: int, size: TableSize) -> int:
@@ -250,8 +252,11 @@ def _radial_bytes(path: OpticalPath, planes: int, size: TableSize) -> int:
     return round(SLACK * (8 * 2 * values + max(kept, 8 * (at_once + transfer_functions.VALUES))))
 
 
-def _harmonic_bytes(path: OpticalPath, transfers: int, size: TableSize) -> int:
-    """Return the memory of the harmonics of all rings of a field, by the transfers of each."""
+def _harmonic_bytes(path: OpticalPath, transfers: int, size: TableSize) -> tuple[int, int]:
+    """Return the memory of the harmonics of all rings of a field while they are made, and then.
+
+    `transfers` are those of each.
+    """
     light = path.transfer.with_half_the_wavelengths().wavelengths
     held = most = 0
     for blur in of_kind([ring.blur for ring in path.field_rings], PlaneTransfer):
@@ -261,7 +266,7 @@ def _harmonic_bytes(path: OpticalPath, transfers: int, size: TableSize) -> int:
         one = 16 * ring_entries(path.field_rings, size) * harmonics
         most = max(most, held + one * (copies * len(light) + 2 * transfers))
         held += one * transfers
-    return most
+    return most, held
 
 
 def _samples(path: OpticalPath, scene: SampledScene, highest: float, planes: int) -> int:
