@@ -235,12 +235,13 @@ def table_bytes(path: OpticalPath, planes: int, size: TableSize) -> tuple[int, i
     if not directed:
         return of_length + of_blurs, of_length + of_blurs, of_length + of_blurs
     grids = [blur.kept_bytes(light, by_harmonics=True) for blur in directed]
-    # What the last one was made of is as large, and not given back at once.
-    kept = min(sum(grids), GRID_CACHE_BYTES + max(grids)) + max(grids)
+    kept = min(sum(grids), GRID_CACHE_BYTES + max(grids))
     before = of_length + of_blurs + round(SLACK * kept)
     before += max(blur.library_bytes for blur in directed)
     most, held = _harmonic_bytes(path, planes * colors, size)
-    return before, before + round(SLACK * most), before + round(SLACK * held)
+    # What the last grid was made of is as large, and given back to what filters.
+    making = before + round(SLACK * max(grids))
+    return making, making + round(SLACK * most), before + round(SLACK * held)
 
 
 def _radial_bytes(path: OpticalPath, planes: int, size: TableSize) -> int:
