@@ -140,7 +140,7 @@ def test_smaller_than_rounding_is_sure():
 @pytest.mark.parametrize(
     ("f_number", "chart"),
     [
-        (1.2, "eye-chart"),
+        pytest.param(1.2, "eye-chart", marks=pytest.mark.long),
         (8, "siemens-star"),
         pytest.param(1.2, "siemens-star", marks=pytest.mark.long),
         pytest.param(8, "eye-chart", marks=pytest.mark.long),

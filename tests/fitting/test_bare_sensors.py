@@ -116,7 +116,7 @@ def test_an_amount_of_no_light_is_refused(plain):
 
 def test_intervals_hold_the_truth_of_six_sensors():
     """One of each kind: four of five intervals hold at least (90 % should)."""
-    held = [inside for listed in coverage(range(6), 64).values() for _, inside in listed]
+    held = [inside for listed in coverage(range(6), 48).values() for _, inside in listed]
     assert np.mean(held) >= 0.8
 
 

@@ -34,7 +34,7 @@ TRUE: dict[str, Any] = {
         "readout": {"full_well": f"{WELL:g} e", "read_noise": f"{READ} e", "gains": [1, 8]},
         "fpn": {"offset_pixel": "2 e", "gain_pixel": "0.5 %"},
     },
-    "array": {"rows": 64, "columns": 64, "pattern": "monochrome"},
+    "array": {"rows": 48, "columns": 48, "pattern": "monochrome"},
     "exposure": {"time": "10 ms"},
     "adc": {"bits": 12, "offset": "100 DN", "gain": f"{GAIN} DN/e"},
     "processing": [],
