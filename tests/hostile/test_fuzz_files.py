@@ -15,7 +15,7 @@ from making import long_except
 from mutations import harmed
 from processes import VCAM, environment
 
-BLOCKS, CAMERAS, STUDIES = 20, 75, 25
+BLOCKS, CAMERAS, STUDIES = 40, 38, 12
 """2000 files, in blocks that processes can share."""
 SIMULATED = 25  # every so manieth camera that is accepted
 
@@ -31,7 +31,7 @@ def test_every_file_is_accepted_or_refused_with_a_message(block, tmp_path):
                 ends[found.end] += 1
     # neither all broken beyond the YAML, nor all harmless: else the test says little
     assert ends["refused"] > 0.3 * (CAMERAS + STUDIES)
-    assert ends["accepted"] > 10
+    assert ends["accepted"] > 5
 
 
 @pytest.mark.parametrize("share", long_except([0], range(4)))
