@@ -113,8 +113,10 @@ class Collector:
         u, v = (x - self.x0) / self.width, (y - self.y0) / self.height
         i, j = np.floor(v).astype(int), np.floor(u).astype(int)
         s, t = v - i, u - j
-        above = self.sum[i, j] * (1 - t) + self.sum[i, j + 1] * t
-        below = self.sum[i + 1, j] * (1 - t) + self.sum[i + 1, j + 1] * t
+        flat, at = self.sum.ravel(), i * self.sum.shape[1] + j
+        above = flat.take(at) * (1 - t) + flat.take(at + 1) * t
+        at += self.sum.shape[1]
+        below = flat.take(at) * (1 - t) + flat.take(at + 1) * t
         return above * (1 - s) + below * s
 
     def at(self, x: np.ndarray, y: np.ndarray, width: float, height: float) -> np.ndarray:

@@ -74,7 +74,7 @@ def server():
             asked.append(self.client_address)
 
     with TCPServer(("127.0.0.1", 0), Handler) as listening:
-        threading.Thread(target=listening.serve_forever, daemon=True).start()
+        threading.Thread(target=listening.serve_forever, args=(0.01,), daemon=True).start()
         yield f"127.0.0.1:{listening.server_address[1]}", asked
         listening.shutdown()
 

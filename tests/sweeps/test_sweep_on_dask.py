@@ -95,7 +95,7 @@ def test_a_killed_worker_changes_nothing(tmp_path):
 @pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::DeprecationWarning")
 def test_a_scheduler_that_does_not_answer(tmp_path, monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr(workers, "CONNECT_TIMEOUT", 0.5)
+    monkeypatch.setattr(workers, "CONNECT_TIMEOUT", 0.1)
     start = time.monotonic()
     with pytest.raises(CannotDo, match="no Dask scheduler answers at"):
         sweep(written(tmp_path), tmp_path / "out", scheduler="tcp://127.0.0.1:1")
