@@ -343,7 +343,11 @@ def cards_before_an_edge() -> list[dict]:
 
 
 @pytest.mark.parametrize(
-    ("effects", "tails"), [(QUIET, ray_windows.BEYOND * 3e-4), (RAYS_ALONE, 1e-9)]
+    ("effects", "tails"),
+    [
+        (QUIET, ray_windows.BEYOND * 3e-4),
+        pytest.param(RAYS_ALONE, 1e-9, marks=pytest.mark.long),
+    ],
 )
 def test_what_even_light_behind_hides_is_within_its_bound(effects, tails, tmp_path, monkeypatch):
     """Against windows that are chosen as if all light behind were black and white.
