@@ -242,9 +242,7 @@ def _spectral_layers(
     memory_model.require(needed(least), g)
     image = sampled_image(path, scene, highest, mixing, least)
     size = table_size(path, image.highest)
-    # A layer's image is held beside those of others, counted by the highest frequency.
-    filtered = highest if path.has_opacity else image.highest
-    total = needed(filtered, memory_model.table_bytes(path, len(mixing[0]), size))
+    total = needed(image.highest, memory_model.table_bytes(path, len(mixing[0]), size))
     memory_model.require(total, g)
     modes: tuple[Mode, ...] = ()
     if field_rings:

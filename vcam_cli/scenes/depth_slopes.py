@@ -21,9 +21,12 @@ import math
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.parallel import pieces
 from vcam_cli.physics.aberration import paraboloid_transfer
 from vcam_cli.scenes.depth_detail import Detail, block_means
 
+AT_ONCE = 1 << 18
+"""Rises that are looked at together: temporary arrays of all of them take 80 bytes a sample."""
 STEEPEST = 1.0
 """Difference of the radii of samples side by side above which they are no slope under any
 other criterion: it would fold under the rays [samples]."""
@@ -49,16 +52,17 @@ def slopes(radius: Array) -> tuple[Array, Array]:
         Rises (h - 1, w) and (h, w - 1) [samples]. A rise is at most what it is on one side, and 0
         where it stands alone: planes one behind the other have no slope.
     """
-    found = []
-    for axis in (0, 1):
-        rise = np.moveaxis(np.diff(radius, axis=axis), axis, 0)
-        rise = np.where(np.abs(rise) < STEEPEST, rise, 0)
-        none = np.zeros_like(rise[:1])
-        before, after = np.concatenate([none, rise[:-1]]), np.concatenate([rise[1:], none])
-        alike = [np.where(rise * other > 0, np.abs(other), 0) for other in (before, after)]
-        most = np.maximum(*alike)
-        found.append(np.moveaxis(np.clip(rise, -most, most), 0, axis))
-    return found[0], found[1]
+    down, right = (np.diff(radius, axis=axis) for axis in (0, 1))
+    for lines in (down, right.T):
+        for some in pieces(lines.shape[1], max(1, AT_ONCE // max(len(lines), 1))):
+            rise = lines[:, some]
+            rise[np.abs(rise) >= STEEPEST] = 0
+            size, most = np.abs(rise), np.zeros_like(rise)
+            alike = rise[1:] * rise[:-1] > 0
+            most[1:] = np.where(alike, size[:-1], 0)
+            np.maximum(most[:-1], np.where(alike, size[1:], 0), out=most[:-1])
+            np.clip(rise, -most, most, out=rise)
+    return down, right
 
 
 def divided(radius: Array, count: int) -> Array:

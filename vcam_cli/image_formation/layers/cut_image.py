@@ -20,13 +20,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from vcam_cli import memory
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.blurs import Blur, SeparableTransfer
 from vcam_cli.effects.optics.paraboloid import Paraboloid
 from vcam_cli.effects.optics.wavefront_blur import AberrationBlur
+from vcam_cli.image_formation.estimates import memory_model
 from vcam_cli.image_formation.layers.gathering import Pixels
 from vcam_cli.image_formation.layers.layered import is_of_lens
 from vcam_cli.image_formation.layers.ray_cells import Window
@@ -42,8 +42,12 @@ from vcam_cli.image_formation.optical_path import (
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.scenes.depth_scene import CutLayer, DepthScene, SlopeLayer
 
-PLANES = 10
-"""Values of every pixel and color that are kept at once."""
+KEPT, COMPOSED = 4, 10
+"""Values of every pixel and color that are kept while a layer is formed, and that there are while
+it is composed with those before it."""
+CUT = 90
+"""Of a sample of the picture while what is hidden is looked for: distances to what is seen beside
+it, and where that is, for which the library takes as much again [bytes]."""
 FormImage = Callable[[OpticalPath, CutLayer | SlopeLayer], tuple[Layers, SpectrumReport]]
 """What forms the image of a flat scene."""
 
@@ -73,8 +77,7 @@ def cut_image(
         How the scene was sampled and filtered.
     """
     reports: list[SpectrumReport] = []
-    held = _held_bytes(path, scene)
-    memory.require(held, path.geometry.rows, path.geometry.columns)
+    memory_model.require(_held_bytes(path, scene), path.geometry)
     used = [int(number) for number in np.flatnonzero(scene.cut.is_used())]
 
     def formed(
@@ -114,7 +117,7 @@ def cut_image(
         hidden_most=behind.most_unknown * float(opened.max(initial=0.0)),
         ray_values=rays.values,
     )
-    return iter([Layer(lambda color, rows: light[color, rows])]), _report(path, reports, cut, held)
+    return iter([Layer(lambda color, rows: light[color, rows])]), _report(path, scene, reports, cut)
 
 
 def _layer_path(path: OpticalPath, optics: LayerOptics, count: int) -> OpticalPath:
@@ -154,20 +157,21 @@ def _with_paraboloid(optics: LayerOptics) -> LayerOptics:
     return replace(optics, effects=(*kept, Paraboloid(abs(optics.radius))))
 
 
-def _held_bytes(path: OpticalPath, scene: DepthScene) -> int:
-    """Return the memory of what is kept while layers are formed, one by one [bytes].
+def _held_bytes(path: OpticalPath, scene: DepthScene, forming: int = 0) -> int:
+    """Return the memory of layers that are formed one by one, each with `forming` bytes.
 
     Of pixels: light, cover and what is still clear, and the same of what is hidden. Of samples:
     light for the rays, and of a layer its shares and sources.
     """
     size, pixels = path.settings.float_width // 8, path.geometry.rows * path.geometry.columns
-    colors = len(path.mosaic.colors)
-    samples = (colors * size + 40) * scene.depth.size
-    return PLANES * colors * pixels * size + samples
+    plane = len(path.mosaic.colors) * pixels * size
+    samples = (len(path.mosaic.colors) * size + 40) * scene.depth.size
+    layers = max(KEPT * plane + forming, COMPOSED * plane + memory_model.BASE) + samples
+    return max(layers, memory_model.BASE + CUT * scene.depth.size)
 
 
 def _report(
-    path: OpticalPath, reports: list[SpectrumReport], cut: CutReport, held: int
+    path: OpticalPath, scene: DepthScene, reports: list[SpectrumReport], cut: CutReport
 ) -> SpectrumReport:
     """Return the report on the image of layers."""
     names = {name for own in reports for name in own.changes}
@@ -178,7 +182,7 @@ def _report(
             name: math.hypot(*(own.changes.get(name, 0.0) for own in reports)) for name in names
         },
         peak=math.inf,
-        memory=held + max((own.memory for own in reports), default=0),
+        memory=_held_bytes(path, scene, max((own.memory for own in reports), default=0)),
         cut=cut,
         parts=tuple((path.geometry, 2 * len(path.mosaic.colors), own) for own in reports),
     )

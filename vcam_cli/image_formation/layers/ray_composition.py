@@ -86,9 +86,11 @@ def composed(shown: Iterable[Planes], hidden: Iterable[Planes]) -> Planes:
     for shone, covered in shown:
         total = total + shone * _visible(covered, clear)
         clear = np.maximum(clear - covered, 0)
+        del shone, covered  # before the next layer is formed
     behind: list[Array | float] = [0.0, 0.0]
     for layer in hidden:
         behind = [own + plane for own, plane in zip(behind, layer, strict=True)]
+        del layer
     light, cover = np.asarray(behind[0]), np.asarray(behind[1])
     visible = _visible(cover, clear)
     opened = np.broadcast_to(cover * visible, np.shape(clear))
