@@ -73,8 +73,7 @@ def judge(
     camera = frame.load(folder, "draft", "all")
     true = frame_truth.truth(frame, camera)
     # Variances are stated at the mean of pixels that are read as one; codes are their sum.
-    binning = camera.array.binning
-    summed = binning.count if binning is not None and binning.kind == "digital" else 1
+    summed = frame_truth.summed_codes(camera)
     mean, variance, predicted, said = {}, {}, {}, ""
     try:
         all_on = prepare(camera, 1)[0]

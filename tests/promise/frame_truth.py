@@ -48,7 +48,8 @@ def truth(frame: Frame, camera: Camera) -> Exact:
     time = exposure_time(camera, own, photo)
     electrons = time / own.time * photo + own.dark_rate * time
     mean = binned(camera, electrons)
-    return Exact(mean, found.error, colors(camera, own), full_well(camera))
+    well = summed_codes(camera) * full_well(camera)
+    return Exact(mean, found.error, colors(camera, own), well)
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ class Exact(Truth):
     color: np.ndarray
     """A number for the color of every raw pixel."""
     well: float
-    """Full well [electrons]."""
+    """Full well, of pixels whose codes are added that of all [electrons]."""
 
     @property
     def clipped(self) -> np.ndarray:
@@ -74,6 +75,12 @@ class Exact(Truth):
 def full_well(camera: Camera) -> float:
     """Of one pixel, as the file gives it [electrons]."""
     return float(camera.pixel.readout.full_well)
+
+
+def summed_codes(camera: Camera) -> int:
+    """Number of pixels whose codes are added."""
+    binning = camera.array.binning
+    return binning.count if binning is not None and binning.kind == "digital" else 1
 
 
 def exposure_time(camera: Camera, own: Setup, photo: np.ndarray) -> float:
