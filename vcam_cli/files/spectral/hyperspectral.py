@@ -115,7 +115,7 @@ def read_cube(
         if isinstance(data, StoredSamples):
             extra = data.reading_bytes()
         else:
-            extra = round(stored.copies * data.nbytes) + samples.extra_bytes
+            extra = max(round(stored.copies * data.nbytes), samples.extra_bytes)
         return Cube(data, _bands(stored, order), extra), (*stored.notes, *notes)
 
 
