@@ -143,7 +143,7 @@ REFUSED = {
     "effects.shot_noise": ({"effects": {"shot_noise": "off"}}, "switched off"),
     "adc.bits": ({"adc": {"bits": 3}}, "lost in rounding"),
     "exposure": ({"pixel.photodetector.dark_current": "4000 ke/s"}, "dark current alone"),
-    "scene.illuminant": ({"optics.transmittance": 0}, "see nothing"),
+    "scene.illuminant": ({"optics.transmittance": 0}, "do not respond"),
 }
 
 

@@ -475,17 +475,18 @@ def frame_bytes(
     # rate, electrons, codes, numbers of colors, render
     frame = pixels * (2 * width + codes + 1 + colors)
     # The SNR of the picture has its signal, a copy and a mask, before any image is compared.
-    figures = max(pixels * (2 * width + 1), EDGE * edge)
+    figures = pixels * (2 * width + 1)
     compared = comparison_bytes(pixels, colors) if judged else 0
     if screen:
         compared = max(compared, 2 * pixels * colors * width + round(screen / SLACK))
-    frame += max(figures, compared)
     if samples:  # all but the last's, the photocurrent, and what is made into a picture
         frame += pixels * ((samples - 1) * (width + codes) + 2 * width)
     frame += SCATTERED * scattered
     light = pixels * width * max(colors + 1, TRANSPORTED if transported else 0)
-    held = max(light, frame)
-    return BASE + round(SLACK * held) + work_bytes(pixels, 2)
+    held = max(light, frame + max(figures, compared))
+    # An edge's response is found by one thread, behind the others.
+    found = round(SLACK * (frame + EDGE * edge))
+    return BASE + max(round(SLACK * held) + work_bytes(pixels, 2), found)
 
 
 def comparison_bytes(pixels: int, colors: int) -> int:
