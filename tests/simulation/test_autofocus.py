@@ -200,8 +200,8 @@ def test_of_a_plateau_it_finds_the_inside(middle):
 
 PHASE = EDGE | {
     "scene.source": {"kind": "chart", "chart": "siemens-star"},
-    "array.rows": 64,
-    "array.columns": 96,
+    "array.rows": 96,
+    "array.columns": 128,
     "pixel.phase_detection": "dual",
 }
 MASKED = {
