@@ -46,8 +46,8 @@ KEPT, COMPOSED = 4, 10
 """Values of every pixel and color that are kept while a layer is formed, and that there are while
 it is composed with those before it."""
 CUT = 90
-"""Of a sample of the picture while what is hidden is looked for: distances to what is seen beside
-it, and where that is, for which the library takes as much again [bytes]."""
+"""Of a sample of the picture while hidden samples are looked for: the distance to the nearest
+visible one and its place, and as much again that the library takes [bytes]."""
 FormImage = Callable[[OpticalPath, CutLayer | SlopeLayer], tuple[Layers, SpectrumReport]]
 """What forms the image of a flat scene."""
 
