@@ -29,7 +29,7 @@ from vcam_cli.readout.chain import ReadoutChain
 from vcam_cli.readout.layout import Layout
 from vcam_cli.records import dataclass
 from vcam_cli.scenes.layered import AnyScene
-from vcam_cli.simulation import cost_model, plan
+from vcam_cli.simulation import cost_model, phase_memory, plan
 from vcam_cli.simulation.exposed_light import ExposedLight
 from vcam_cli.simulation.run import Run
 from vcam_cli.simulation.scene_light import SceneLight
@@ -202,9 +202,7 @@ def plan_frame(
         codes = exposure.codes_type(solved.chain.adc.bits)
         of_halves = half_image_bytes(pixels, solved.settings, np.dtype(codes).itemsize)
         if solved.output.phase:
-            from vcam_cli.simulation.output import phase_files
-
-            of_halves += phase_files.written_bytes(solved)
+            of_halves += phase_memory.written_bytes(solved)
     of_light = max(light.spectrum.memory, exposed.memory)
     decided = plan.make(
         solved.effects,
