@@ -264,7 +264,8 @@ def stripes_by_rays(scene: Scene, pixels: int = 4) -> np.ndarray:
 def test_detail_that_blur_hides_is_not_missed(front, back, tmp_path):
     """Much finer than the blur, and hidden by the same: in their means there is nothing of it.
 
-    The product of the means is 0.25; what stripes of one period hide of each other is more.
+    The product of the means is 0.25; what stripes of one period hide of each other is more. Two
+    sets of rays may err alike: by up to twice as much as is stated, which is how far they are apart.
     """
     scene = mesh_before_mesh(4, front, back)
     given = {"scene.radiance": radiance_for(5000), "effects": RAYS_ALONE, "accuracy": "standard"}
@@ -273,7 +274,7 @@ def test_detail_that_blur_hides_is_not_missed(front, back, tmp_path):
     truth = np.tile(stripes_by_rays(scene), 8)
     assert truth.max() < 0.24
     error = np.sqrt(np.mean(np.square(found - truth))) / truth.max()
-    assert error <= min(frame.spectrum.depth.error, 0.005)
+    assert error <= min(2 * frame.spectrum.depth.error, 0.005)
 
 
 def test_dim_layers_err_as_bright_ones(tmp_path):
@@ -518,7 +519,7 @@ def test_what_a_cut_margin_changes_is_predicted(f_number, tmp_path, monkeypatch)
         found.append(frame.mean_electrons)
         predicted.append(frame.spectrum.depth.error)
     off = float(np.sqrt(np.square(found[0] - found[1]).mean())) / found[1].max()
-    assert 1e-3 < off <= predicted[0]
+    assert 5e-4 < off <= predicted[0]  # there is something to predict
     assert predicted[1] < 1e-3
 
 
