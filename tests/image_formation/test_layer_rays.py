@@ -265,7 +265,7 @@ def test_detail_that_blur_hides_is_not_missed(front, back, tmp_path):
     """Much finer than the blur, and hidden by the same: in their means there is nothing of it.
 
     The product of the means is 0.25; what stripes of one period hide of each other is more. Two
-    sets of rays may err alike: by up to twice as much as is stated, which is how far they are apart.
+    sets of rays may err alike: by up to twice as much as is stated, how far they are apart.
     """
     scene = mesh_before_mesh(4, front, back)
     given = {"scene.radiance": radiance_for(5000), "effects": RAYS_ALONE, "accuracy": "standard"}
