@@ -26,6 +26,7 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.cache import ByteCache
+from vcam_cli.parallel import pieces
 from vcam_cli.records import dataclass
 from vcam_cli.scenes import discs
 from vcam_cli.scenes.base import Chart, Frame, PaintedCells
@@ -71,6 +72,8 @@ PAINTING_BYTES = 13, 116, 170
 """Temporary arrays of each cell, of each that an outline crosses, and of each in which two do, as
 often as it is looked at [bytes]: above those traced of ten seeds in bands of a quarter of a frame.
 Where a band has many small leaves they are twice as many as in the mean."""
+VALUES = 1 << 15
+"""Points at which values are looked up together: 2 MB."""
 SEEN_BYTES = 2, 20, 70
 """What is kept of them of visible leaves [bytes], likewise above the 5 to 41 a cell traced."""
 PUT_TOGETHER = 2.2
@@ -247,8 +250,11 @@ class PlacedLeaves(Chart):
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the values at points."""
-        color = self.leaves.color(mix)
-        return discs.values(self.leaves.discs, color, x / self.unit, y / self.unit)
+        color, x, y = self.leaves.color(mix), x / self.unit, y / self.unit
+        out = np.empty((len(mix), len(y), len(x)), color.dtype)
+        for rows in pieces(len(y), max(1, VALUES // len(x))):
+            out[:, rows] = discs.values(self.leaves.discs, color, x, y[rows])
+        return out
 
 
 @dataclass(frozen=True)
