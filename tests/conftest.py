@@ -135,12 +135,8 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
     are_drawn = "draws" in item.keywords or not is_quick(item.config)
     if shared := sys.modules.get("vcam_cli.simulation.shared"):
         kept_bytes = kept_bytes or shared.KEPT
-        keeps = "keeps_light" in item.keywords
-        shared.KEPT = kept_bytes if keeps else 0
-        vars(shared.RECENT).pop("shared_with", None)
+        shared.KEPT = kept_bytes if "keeps_light" in item.keywords else 0
         shared.RECENT.clear()
-        if not keeps:  # nor look after the files of what is kept: a hundredth of the time
-            shared.RECENT.shared_with = lambda _: shared.Recent()._shared
 
 
 @pytest.hookimpl(wrapper=True)
