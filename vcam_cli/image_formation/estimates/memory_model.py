@@ -231,12 +231,13 @@ def table_bytes(path: OpticalPath, planes: int, size: TableSize) -> tuple[int, i
         tables = by_wavelength + 3 * 8 * per_table
         of_blurs = round(SLACK * (tables + sum(blur.kept_bytes(light) for blur in directed)))
         of_blurs += INTERPOLATION
+    still = of_length + of_blurs
     directed = of_kind([ring.blur for ring in path.field_rings], PlaneTransfer)
     if not directed:
-        return of_length + of_blurs, of_length + of_blurs, of_length + of_blurs
+        return still, still, still
     grids = [blur.kept_bytes(light, by_harmonics=True) for blur in directed]
     kept = min(sum(grids), GRID_CACHE_BYTES + max(grids))
-    before = of_length + of_blurs + round(SLACK * kept)
+    before = still + round(SLACK * kept)
     before += max(blur.library_bytes for blur in directed)
     most, held = _harmonic_bytes(path, planes * colors, size)
     # What the last grid was made of is as large, and given back to what filters.
