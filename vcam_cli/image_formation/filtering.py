@@ -131,7 +131,7 @@ class _Rows:
     shares: Array
     """Weights (n, nodes) of the nodes in every row."""
     values: Array
-    """Transfer (R, C, nodes, count) at the nodes [e/s]."""
+    """Transfer (P, nodes, count) of each mixture and a color that sees it at the nodes [e/s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -325,7 +325,7 @@ class Filter:
         self, spectrum: SceneSpectrum, some: Iterable[_Rows]
     ) -> Iterator[tuple[slice, slice, Array]]:
         """Yield rows of the filtered spectrum: (which of the terms, colors, (colors, n, count))."""
-        every = range(len(spectrum))
+        every, numbers = range(len(spectrum)), self.tables.pair_numbers
         for rows in some:
             planes = [
                 self.x.extend(spectrum.rows(plane, rows.index, rows.count), rows.count)
@@ -337,7 +337,8 @@ class Filter:
                     own = slice(colors.start + part.start, colors.start + part.stop)
                     total: Array | None = None
                     for plane in seen:
-                        values = rows.values[plane, own]
+                        first = int(numbers[plane, own.start])
+                        values = rows.values[first : first + own.stop - own.start]
                         light = (
                             rows.shares @ values if few else product(rows.shares, values[0])[None]
                         )
@@ -409,7 +410,9 @@ def has_few_terms(x: Axis, y: Axis, tables: Tables) -> bool:
     return x.terms * y.terms * math.prod(tables.shape) <= KEPT
 
 
-def working_bytes(x: Axis, y: Axis, planes: int, colors: int, width: int) -> tuple[int, int]:
+def working_bytes(
+    x: Axis, y: Axis, planes: int, colors: int, pairs: int, width: int
+) -> tuple[int, int]:
     """Return the memory of a thread while it filters a piece of a spectrum.
 
     Parameters
@@ -419,7 +422,9 @@ def working_bytes(x: Axis, y: Axis, planes: int, colors: int, width: int) -> tup
     planes : int
         Number of planes of the spectrum.
     colors : int
-        Number of colors.
+        Number of colors that see the same planes.
+    pairs : int
+        Number of pairs of a plane and a color that sees it.
     width : int
         Memory of a number [bytes].
 
@@ -432,7 +437,7 @@ def working_bytes(x: Axis, y: Axis, planes: int, colors: int, width: int) -> tup
     """
     rows = min(rows_at_once(x.terms), y.terms, LONGEST)
     folds = math.ceil(y.terms / y.folded_terms)
-    nodes = planes * colors * min(NODES, y.terms) * x.terms
+    nodes = pairs * min(NODES, y.terms) * x.terms
     light = colors if rows * x.terms <= FEW else 1
     of_rows = (planes + 3 * light) * rows * x.terms
     lowest, others = (

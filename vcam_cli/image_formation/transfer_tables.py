@@ -181,14 +181,29 @@ class Tables:
         return [(planes, colors) for planes, colors in found if len(planes)]
 
     @cached_property
-    def steps(self) -> tuple[Array, Array, Array]:
-        """Entries over |f| of the tables that are not 0, steps to the next, and which they are.
+    def pair_numbers(self) -> Array:
+        """Number (R, C) of a mixture and a color that sees it, in order, among all such pairs."""
+        return np.asarray(np.cumsum(self.is_seen).reshape(self.shape) - 1)
 
-        They are (n, entries), (n, entries - 1) and (R C,).
-        """
-        every = self.radial.reshape(-1, self.radial.shape[-1])
-        lit = np.asarray(every.any(axis=1))
-        return every[lit], np.diff(every[lit]), lit
+    def of_pairs(self, every: Array) -> Array:
+        """Return what is given for every mixture and color (R, C, ...) for those seen (P, ...)."""
+        if self.is_seen.all():
+            return every.reshape(-1, *every.shape[2:])
+        return every[self.is_seen]
+
+    def of_every(self, pairs: Array) -> Array:
+        """Return what is given for pairs (P, ...) for every mixture and color, 0 where unseen."""
+        if self.is_seen.all():
+            return pairs.reshape(*self.shape, *pairs.shape[1:])
+        every = np.zeros((*self.shape, *pairs.shape[1:]))
+        every[self.is_seen] = pairs
+        return every
+
+    @cached_property
+    def steps(self) -> tuple[Array, Array]:
+        """Entries over |f| of each pair (P, entries), and steps to the next (P, entries - 1)."""
+        entries = self.of_pairs(self.radial)
+        return entries, np.diff(entries)
 
     @property
     def is_radial(self) -> bool:
@@ -293,7 +308,9 @@ class TableReader:
     """Tables of each parity that has a share in it."""
 
     def values(self, fy: Array, count: int | None = None) -> Array:
-        """Return H_rc at some frequencies along y.
+        """Return H_rc of mixtures and colors that see them at some frequencies along y.
+
+        Of a layer half of all are 0: its light has none of its opacity.
 
         Parameters
         ----------
@@ -305,7 +322,7 @@ class TableReader:
         Returns
         -------
         Array
-            Transfer (R, C, m, count) [e/s]; planes add nothing beyond the end of the tables.
+            Transfer (P, m, count) [e/s]; planes add nothing beyond the end of the tables.
         """
         fx = self.fx[:count]
         if self.tables.factors:
@@ -318,7 +335,7 @@ class TableReader:
 
     def _product(self, fx: Array, fy: Array) -> Array:
         factor = self.tables.factor(fx, fy)
-        total = np.zeros((*self.tables.shape, len(fy), len(fx)))
+        total = np.zeros((self.tables.is_seen.sum(), len(fy), len(fx)))
         for own, part in self.parts.items():
             other = parity_of_product(own, self.parity)
             sign = (UNITS[own] * UNITS[other] / UNITS[self.parity]).real
@@ -334,12 +351,12 @@ class PartReader:
     has_radial: bool
     """Whether this parity has the part over |f|."""
     plane: Array | None
-    """Spline coefficients (R, C, m, m) over fy and fx, where there is such a part."""
+    """Spline coefficients (P, m, m) over fy and fx, where there is such a part."""
     spline_x: Any
     """Sparse (n, m): what each of them counts at frequencies along x, four at a time."""
 
     def values(self, fx: Array, fy: Array) -> Array:
-        """Return the tables at the first frequencies along x (n,) and at fy (m,): (R, C, m, n)."""
+        """Return the tables at the first frequencies along x (n,) and at fy (m,): (P, m, n)."""
         if self.plane is None:
             return self.radial_values(fx, fy)
         along_y = spline_weights(self.plane.shape[-1], fy / self.tables.top)
@@ -354,7 +371,7 @@ class PartReader:
 
     def radial_values(self, fx: Array, fy: Array) -> Array:
         """Return the part over |f| at frequencies (n,) and (m,); its end holds beyond it."""
-        tables, (entries, steps, lit) = self.tables, self.tables.steps
+        tables, (entries, steps) = self.tables, self.tables.steps
         last = steps.shape[-1]
         position = np.add(np.square(fx), np.square(fy)[:, None]).ravel()
         np.sqrt(position, out=position)  # in a quarter of the time of `hypot`
@@ -364,10 +381,7 @@ class PartReader:
         values = steps.take(index, axis=-1)
         values *= position - index
         values += entries.take(index, axis=-1)
-        if not lit.all():  # of a layer half of them are 0: its light has none of its opacity
-            some, values = values, np.zeros((len(lit), len(index)))
-            values[lit] = some
-        shaped: Array = values.reshape(*tables.shape, len(fy), len(fx))
+        shaped: Array = values.reshape(-1, len(fy), len(fx))
         if tables.order:
             angle = tables.order * np.arctan2(fy[:, None], fx)
             shaped *= np.sin(angle) if tables.is_sine else np.cos(angle)
@@ -404,11 +418,11 @@ def _part_reader(tables: Tables, parity: int, fx: Array) -> PartReader:
     if plane is None:
         return PartReader(tables, has_radial, None, None)
     spline = spline_weights(plane.shape[-1], fx / tables.top)
-    return PartReader(tables, has_radial, _spline_coefficients(plane), spline)
+    return PartReader(tables, has_radial, _spline_coefficients(tables.of_pairs(plane)), spline)
 
 
 def _spline_coefficients(plane: Array) -> Array:
-    """Return the coefficients (R, C, m, m) of the cubic splines through tables over fy and fx."""
+    """Return the coefficients (P, m, m) of the cubic splines through tables over fy and fx."""
     from scipy.interpolate import make_interp_spline
 
     at = np.linspace(0, 1, plane.shape[-1])

@@ -156,7 +156,8 @@ def _filtering_bytes(
     """
     width, samples, light = held
     x, y = axes(path, part, highest)
-    lowest, others = working_bytes(x, y, planes, len(path.mosaic.colors), width)
+    colors = len(path.mosaic.colors) // (2 if path.has_opacity else 1)  # that see the same planes
+    lowest, others = working_bytes(x, y, planes, colors, planes * colors, width)
     again = path.transfer.plane_blurs or path.field_rings  # once more for every filter
     first = 1.0 if again else min(1.0, path.workers * LONGEST / y.folded_terms)
     beside = (path.workers - 1) * others

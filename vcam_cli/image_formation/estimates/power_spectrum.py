@@ -378,7 +378,7 @@ def _values(tables: Tables, parity: int, x: Blocks, y: Blocks, place: int) -> Ar
 
 
 def _read_tables(tables: Tables, parity: int, x: Blocks, y: Blocks, place: int) -> Array:
-    return reader(tables, parity, x.places[place]).values(y.places[place])
+    return tables.of_every(reader(tables, parity, x.places[place]).values(y.places[place]))
 
 
 def _read_radial(tables: Tables, parity: int, x: Blocks, y: Blocks, place: int) -> Array:
