@@ -171,8 +171,10 @@ def front_to_back(layers: Sequence[Planes]) -> Array:
     return total
 
 
-def covariance_bytes(layers: Sequence[RayLayer], inner: tuple[int, int]) -> int:
-    """Return the memory of layers on cells and of arrays from which `covariance` is found.
+def covariance_bytes(
+    layers: Sequence[RayLayer], inner: tuple[int, int], groups: int, painting: int
+) -> int:
+    """Return the memory of painting layers on cells and of finding `covariance` from them.
 
     Parameters
     ----------
@@ -180,21 +182,28 @@ def covariance_bytes(layers: Sequence[RayLayer], inner: tuple[int, int]) -> int:
         Layers on cells, the nearest first.
     inner : tuple of int
         Rows and columns of cells that have rays.
+    groups : int
+        Groups of rays.
+    painting : int
+        Memory of temporary arrays while a layer is painted [bytes].
 
     Returns
     -------
     int
-        Bytes: planes, what each lets pass, sums over rays, and of these the spectra of all groups,
-        of one, and their product; in 64 bits the transfer, and what it is found from.
+        Bytes: planes, beside temporary arrays, or beside what each lets pass, sums over rays, their
+        spectra and these along one axis at the pixels; of several groups also the spectra of one
+        and their product; in 64 bits the transfer, and what that of groups is found from.
     """
     if not layers:
-        return 0
+        return painting
     last = layers[-1].planes
     planes = sum(layer.planes.nbytes for layer in layers)
     passed = sum(layer.planes[-1].nbytes for layer in layers[:-1])
     colors, cells = len(last) - 1, math.prod(inner)
     images = len(layers) * colors + len(layers) - 1
-    return int(planes + passed + cells * (4 * images * last.itemsize + 4 * colors * 8))
+    arrays, transfers = (3, 1) if groups == 1 else (4, 4)
+    summing = passed + cells * (arrays * images * last.itemsize + transfers * colors * 8)
+    return int(planes + max(summing, painting))
 
 
 def covariance(

@@ -27,6 +27,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import field, replace
 from functools import cached_property, lru_cache, partial
+from heapq import nlargest
 from itertools import count
 from typing import NamedTuple
 
@@ -203,9 +204,8 @@ class RaySum:
             own = Pixels(self.path, one.window).own(one.light)
             light[:, one.window.rows, one.window.columns] += own
         np.maximum(light, 0, out=light)
-        most = max((one.memory for one in sums), default=0)
         memory = self.sharp.nbytes + sum(one.light.nbytes for one in sums)
-        memory += min(self.path.workers, len(sums)) * (most + self._painting_bytes(sums))
+        memory += sum(nlargest(self.path.workers, (one.memory for one in sums)))
         used = [one for one in sums if one.light.any()]
         if not used:
             return Hidden(memory=memory)
@@ -214,12 +214,6 @@ class RaySum:
         error = stated * math.sqrt(squares / (g.rows * g.columns))
         values = sum(one.values for one in sums)
         return Hidden(finest.cells, finest.rays, error, 0.0, values, memory)
-
-    def _painting_bytes(self, sums: Sequence[_Sum]) -> int:
-        """Return the memory of painting the most cells of a sum [bytes]."""
-        every = (self._cells(one.window, one.level) for one in sums)
-        most = max(every, key=lambda cells: math.prod(cells.inner), default=None)
-        return 0 if most is None else self.painting_bytes(most)
 
     def _first_sum(self, window: Window) -> _Sum:
         """Return the sum of the second level, whose cells are halves of the first one's."""
@@ -270,12 +264,13 @@ class RaySum:
     def _summed(self, level: int, cells: Cells, layers: Sequence[RayLayer]) -> _Sum:
         """Return the sum of a level."""
         of, dtype = self.levels[level], self.path.settings.dtype
-        memory = covariance_bytes(layers, cells.inner)
+        groups = self.sharp.groups(rays(of.rays, level % 2, self.opening), of.rings, of.sectors)
+        painting = self.painting_bytes(cells)
+        memory = covariance_bytes(layers, cells.inner, len(groups), painting)
         if all(layer.planes[-1].min() == layer.planes[-1].max() for layer in layers[:-1]):
             colors = len(self.path.mosaic.colors)
             none: Array = np.zeros((colors, *cells.window.pixels), dtype)
             return _Sum(cells.window, level, none, memory=memory)
-        groups = self.sharp.groups(rays(of.rays, level % 2, self.opening), of.rings, of.sectors)
         seen = partial(self.sharp.at_pixels, cells, len(groups))
         light = covariance(layers, groups, cells.inner, cells.met, seen)
         traced = sum(map(len, groups))
