@@ -13,11 +13,9 @@ from vcam_cli.errors import BadInput
 from vcam_cli.files.images.images import read_picture
 from vcam_cli.sweeps import error_maps, sweep_points
 
-pytestmark = pytest.mark.draws
+pytestmark = [pytest.mark.draws, pytest.mark.long]
 
-pytestmark = pytest.mark.long
-
-CHART = {"kind": "chart", "chart": "csf", "max_frequency": "40 lp/mm"}
+CHART = {"kind": "chart", "chart": "csf", "max_frequency": "120 lp/mm"}
 CAMERA = {
     "scene.source": CHART,
     "scene.radiance": "1 W/(sr m2)",
@@ -45,7 +43,7 @@ STACK = {
     "oxide": {"thickness": "3 um", "index": 1.46},
 }
 FIGURES = {
-    "best": {"show": "curves", "quantities": ["mean_s_cielab"], "cases": ["hot"]},
+    "best": {"show": "curves", "quantities": ["mean_s_cielab"], "cases": ["plain", "hot"]},
     "dr": {"show": "curves", "quantities": ["dynamic_range_db", "snr_db", "capacitance"],
            "cases": ["plain", "hot"], "set": {"exposure.time": "30 ms"}},
     "mtf": {"show": "curves", "quantities": ["system_mtf", "sensor_mtf"], "at": ["3 um", "5 um"]},
@@ -119,19 +117,21 @@ def test_plots_are_pictures(swept):
         assert np.ptp(seen) > 0.5, name
 
 
-def test_lines_are_the_points_and_their_optimum(swept):
+@pytest.mark.parametrize(("case", "mark"), [("plain", "optimum"), ("hot", "no optimum")])
+def test_lines_are_the_points_and_their_best(swept, case, mark):
     _, out = swept
-    points = [r for r in rows(out, "points") if r["case"] == "hot"]
-    table = rows(out, "best")
+    points = [r for r in rows(out, "points") if r["case"] == case]
+    table = [r for r in rows(out, "best") if r["case"] == case]
     for row in table[:3]:
         mine = [float(p["mean_s_cielab"]) for p in points
                 if float(p["pixel.width [um]"]) == float(row["pixel.width [um]"])]  # fmt: skip
         assert len(mine) == 2
         found = [float(row[k]) for k in ("mean_s_cielab", "low", "high")]
         assert found == pytest.approx([np.mean(mine), min(mine), max(mine)], rel=1e-15)
-    (best,) = [r for r in rows(out, "optimum") if r["case"] == "hot"]
-    assert table[3]["mark"].startswith("optimum")
-    assert float(table[3]["pixel.width [um]"]) == pytest.approx(float(best["optimum"]), rel=1e-5)
+    (best,) = [r for r in rows(out, "optimum") if r["case"] == case]
+    assert table[3]["mark"].startswith(mark)
+    at = 6.0 if best["optimum"] == "none" else float(best["optimum"])
+    assert float(table[3]["pixel.width [um]"]) == pytest.approx(at, rel=1e-5)
 
 
 def test_properties_are_eqs_3_1_and_3_2(swept):
