@@ -16,6 +16,7 @@ import yaml
 from vcam_cli import load, schedule, simulate
 from vcam_cli.sweeps import properties, sweep_file, sweep_points
 from vcam_cli.sweeps.optimum import find_optimum
+from vcam_cli.sweeps.point_effects import with_every_effect
 
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT / "scripts"))
@@ -167,7 +168,7 @@ def forged_points(runs, grid, chosen):
     for case, at, phase in chosen:
         points = [p for p in grid.points if p.case == case]
         kept = runs[SWEEP]["curves"][case][thesis_runs.METRIC]
-        camera = points[at * len(kept[0]) + phase].camera
+        camera = with_every_effect(points[at * len(kept[0]) + phase].camera)  # as sweeps do
         value = simulate(camera, workers=1).metrics[thesis_runs.METRIC]
         if kept[at][phase] != pytest.approx(value, rel=ANOTHER_MACHINE):
             wrong.append((case, at, phase))
