@@ -15,6 +15,7 @@ from vcam_cli.lenses.glasses import AIR, ModelGlass
 from vcam_cli.lenses.paraxial import paraxial
 from vcam_cli.lenses.prescription import Prescription, Surface
 from vcam_cli.lenses.pupils import pupils
+from vcam_cli.lenses.wavefronts import NoImage, trace_field
 from vcam_cli.physics import zernike
 
 
@@ -126,6 +127,14 @@ def test_relative_illumination_is_the_pupils_area(name):
         # corners of vignetted pupils fall between directions: the oracle errs by up to 2e-5
         tolerance = 4e-6 if vignetted else 1e-9
         assert (np.abs(area / area[0] - rows[:, column]) <= tolerance).all()
+
+
+def test_places_without_light_are_told():
+    waves = np.array([view("double-gauss").lens.primary])
+    with pytest.raises(NoImage, match="no light through 40 mm off axis"):
+        trace_field(view("double-gauss"), np.array([0, 0.04]), waves[0], waves[0])
+    lit, dark = pupils(view("double-gauss"), np.array([0, 0.05]), waves).area[:, 0]
+    assert lit > dark == 0
 
 
 GLASS = ModelGlass("1.5/60", 1.5, 60.0)

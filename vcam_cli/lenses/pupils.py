@@ -179,7 +179,9 @@ def _edge(fullness: Fullness, center: Array, azimuth: Array, scale: float) -> Ar
 
     shape = (*center.shape, len(azimuth))
     low, high = np.zeros(shape), np.full(shape, STRIDE * scale)
-    at_low, at_high = over(low), over(high)
+    # Where no light comes there is no edge: a bracket there ends the search like any other.
+    is_dark = np.isnan(center)[..., None]
+    at_low, at_high = np.where(is_dark, -1.0, over(low)), over(high)
     for _ in range(STRIDES):  # step by step: beyond the edge rays may come through again
         short = at_high < 0
         if not short.any():
@@ -202,4 +204,4 @@ def _edge(fullness: Fullness, center: Array, azimuth: Array, scale: float) -> Ar
         side = np.where(inside, 1, -1)
         low, at_low = np.where(inside, trial, low), np.where(inside, value, at_low)
         high, at_high = np.where(inside, high, trial), np.where(inside, at_high, value)
-    return np.where(np.isnan(center)[..., None], np.nan, (low + high) / 2)
+    return np.where(is_dark, np.nan, (low + high) / 2)
