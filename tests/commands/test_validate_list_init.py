@@ -259,6 +259,16 @@ class TestValidate:
         assert second.startswith("a.yaml:3:13: adc.bits: ")
         assert third.startswith("b.yaml:1:1: the file is empty")
 
+    def test_mistakes_outside_several_files_are_said_with_the_file(self):
+        for name in "ab":
+            Path(f"{name}.yaml").write_text("extends: base.yaml\n")
+        Path("base.yaml").write_text("extends: starter\nadc: {bits: 99}\n")
+        told = vcam("validate", "a.yaml", "b.yaml", code=2).stderr.splitlines()
+        assert [line.split("adc.bits")[0] for line in told] == [
+            f"{name}.yaml: base.yaml:2:13: " for name in "ab"
+        ]
+        assert vcam("validate", "a.yaml", code=2).stderr.startswith("base.yaml:2:13: adc.bits: ")
+
     def test_json(self):
         Path("a.yaml").write_text("extends: starter\nadc: {bits: 99}\n")
         result = vcam("validate", "--json", "a.yaml", "starter", code=2)

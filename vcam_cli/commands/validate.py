@@ -34,8 +34,11 @@ def validate(
     """
     checked = [_check(file, options.overrides(set_)) for file in files]
     for report in checked:
+        name = str(Path(report["file"]))
         for problem in report["problems"]:
-            options.say(problem["text"])
+            # The place of a mistake may be a base or --set, which several files have in common.
+            said = len(files) == 1 or problem["text"].startswith(name)
+            options.say(problem["text"] if said else one_line(f"{name}: {problem['text']}"))
         if report["ok"] and not as_json and not quiet:
             print(one_line(f"{report['file']}: ok ({report['name']})"))
     if as_json:
