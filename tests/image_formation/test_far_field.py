@@ -56,6 +56,24 @@ class Lamp(Chart):
         return np.multiply.outer(mix[:, 0], np.outer(*inside).astype(float))
 
 
+@dataclass(frozen=True)
+class Bar(Chart):
+    """A bright bar below the array, as long as you like."""
+
+    near: float
+    """Its upper edge from the array's center [m]."""
+    side: float = 60e-6
+
+    def paint(self, x_edges, y_edges, mix, out):
+        rows = np.clip(y_edges, self.near, self.near + self.side)
+        rows = np.diff(rows) / np.diff(y_edges)
+        out[:] = np.multiply.outer(mix[:, 0], np.outer(rows, np.ones(len(x_edges) - 1)))
+
+    def values(self, x, y, mix):
+        inside = (y > self.near) & (y < self.near + self.side)
+        return np.multiply.outer(mix[:, 0], np.outer(inside, np.ones(len(x))))
+
+
 CHARTS = {
     "edge": SlantedEdge(0.3, 1.0),
     "chirp": Csf(Frame(14 * PITCH, 10 * PITCH), 0.45 / PITCH, 0.5, 0.9, 0.0),
@@ -103,6 +121,20 @@ def test_rings_tile_the_margin(shape, pitch, blurs):
         assert part.scene.extent == pytest.approx(one, rel=1e-12)
     assert all(a >= b * (1 - 1e-9) for a, b in zip(extents[-1], scene.extent, strict=True))
     assert sum(math.prod(part.scene.shape) for part in parts) < 3e5
+
+
+@pytest.mark.parametrize("margin", [5, 20])
+def test_a_chart_may_end_beside_the_near_field(margin):
+    """Its columns alone end there; a bar across them sends the same light wherever they do."""
+    optical_path = before(*BLURS["f/8"], knobs=replace(REFERENCE, oversampling=5))
+    wide = on_chart(optical_path, Bar(110e-6), margin=250)
+    width = optical_path.geometry.sensor_width + 2 * margin * PITCH
+    scene = wide.crop((0.0, 0.0), width, wide.extent[1])
+    near, parts, _ = split(optical_path, scene)
+    assert near.extent[0] > width
+    assert parts
+    found, expected = signal(optical_path, scene), signal(optical_path, wide)
+    assert rms(found, expected) < 1e-9 * expected.max()
 
 
 SLOW = {

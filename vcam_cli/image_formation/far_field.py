@@ -293,8 +293,10 @@ def far_parts(
     pitch = [size / n / 2 for size, n in zip(inner, cells, strict=True)]
     while any(a < b * (1 - ROUNDING) for a, b in zip(inner, whole.extent, strict=True)):
         clear *= GROWTH
+        # Along one axis the near field may go on beyond the chart's border: so do the rings.
         reached = [
-            min(a + 2 * (clear + widest), b) for a, b in zip(sensor, whole.extent, strict=True)
+            max(min(a + 2 * (clear + widest), b), c)
+            for a, b, c in zip(sensor, whole.extent, inner, strict=True)
         ]
         more = [_even_cells(size, p) for size, p in zip(reached, pitch, strict=True)]
         parts += _ring(whole, more, cells, pitch)
