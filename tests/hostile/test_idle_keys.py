@@ -134,6 +134,8 @@ def digest(result: Result) -> str:
         arrays.append(result.volts)
     if result.samples_dn is not None and result.photocurrent is not None:
         arrays += [result.samples_dn, result.photocurrent]
+    if result.frame.phase_dn is not None:
+        arrays += result.frame.phase_dn
     content = b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)
     return hashlib.sha256(content + repr(dict(result.metrics)).encode()).hexdigest()
 
