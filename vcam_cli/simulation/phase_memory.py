@@ -11,6 +11,24 @@ WRITTEN = 16
 """What writing the codes of a pixel's halves takes: both in 32 bits, and a copy [bytes]."""
 
 
+def compared_block(solved: Solved) -> tuple[int, int]:
+    """Return the pixels whose sum is compared: a block of the mosaic, or one masked pixel.
+
+    Parameters
+    ----------
+    solved : Solved
+        Camera whose pixels have two halves.
+
+    Returns
+    -------
+    rows, columns : int
+        Pixels along y and x.
+    """
+    phase, block = solved.pixel.phase_detection, solved.layout.raw_mosaic.block
+    is_masked = phase is not None and phase.masked is not None
+    return (1, 1) if is_masked else (len(block), len(block[0]))
+
+
 def written_bytes(solved: Solved) -> int:
     """Return the memory that writing both files takes, one beside the other.
 
@@ -25,9 +43,8 @@ def written_bytes(solved: Solved) -> int:
         Bytes, at least those traced.
     """
     rows, columns = solved.geometry.rows, solved.geometry.columns
-    phase, block = solved.pixel.phase_detection, solved.layout.raw_mosaic.block
-    height, width = len(block), len(block[0])
-    if phase is not None and phase.masked is not None:  # single pixels of either side
+    phase, (height, width) = solved.pixel.phase_detection, compared_block(solved)
+    if phase is not None and phase.masked is not None:  # on either side
         down, along = phase.masked.period
-        rows, columns, height, width = -(-rows // down), -(-columns // along), 1, 1
+        rows, columns = -(-rows // down), -(-columns // along)
     return WRITTEN * rows * columns + needed_bytes(rows // height, columns // width, MOST)

@@ -14,7 +14,7 @@ from vcam_cli.quality.disparity import disparity
 from vcam_cli.quality.error_map import false_color
 from vcam_cli.simulation.frame import Frame
 from vcam_cli.simulation.output import raw_file
-from vcam_cli.simulation.phase_memory import MOST
+from vcam_cli.simulation.phase_memory import MOST, compared_block
 
 
 def write_phase(path: Path, frame: Frame, config_hash: str) -> None:
@@ -61,8 +61,7 @@ def frame_disparity(frame: Frame) -> Array:
     """
     assert frame.phase_dn is not None
     phase = frame.solved.pixel.phase_detection
-    block = frame.mosaic.block
-    height, width = (len(block), len(block[0])) if phase and phase.masked is None else (1, 1)
+    height, width = compared_block(frame.solved)
     apart = width if phase is None or phase.masked is None else 2 * phase.masked.period[1]
     left, right = (_summed(codes, height, width) for codes in frame.phase_dn)
     columns = min(left.shape[1], right.shape[1])  # of masked pixels one side may have one more
