@@ -133,12 +133,13 @@ def test_a_pixel_is_saturated_where_all_its_readouts_are(tmp_path) -> None:
     assert np.all(found[:, 2] >= chain.saturated_dn)
 
 
-def test_small_photodiode_has_its_own_dark_signal(tmp_path) -> None:
+@pytest.mark.parametrize("large", [0, 1000])
+def test_small_photodiode_has_its_own_dark_signal(large, tmp_path) -> None:
     """The merge subtracts it, and adds that of the large one: white stays where it was."""
     small = SMALL["small"] | {"dark_current": "400 e/s"}
     dark = {
         "pixel.readout": PIXEL["pixel.readout"] | {"small": small},
-        "pixel.photodetector.dark_current": "1000 e/s",
+        "pixel.photodetector.dark_current": f"{large} e/s",
         "exposure.time": "1 s",
         "scene.radiance": radiance_for(300_000, 1.0),
     }
@@ -146,6 +147,14 @@ def test_small_photodiode_has_its_own_dark_signal(tmp_path) -> None:
     merged = frame.chain.to_electrons(frame.dn.astype(float))
     error = 5 * merged.std() / 64
     assert merged.mean() == pytest.approx(float(frame.mean_electrons.mean()), abs=error)
+
+
+def test_dark_signals_beyond_any_pixel_are_refused_in_both_photodiodes(tmp_path) -> None:
+    current = "1e39 Me/s"
+    small = {**PIXEL["pixel.readout"], "small": {**SMALL["small"], "dark_current": current}}
+    for change in ({"pixel.photodetector.dark_current": current}, {"pixel.readout": small}):
+        with pytest.raises(BadInput, match=r"would make .* electrons"):
+            chain_of(tmp_path, **change)
 
 
 def test_channels_of_the_raw_frame(tmp_path) -> None:

@@ -12,7 +12,7 @@ signals and variances are of one conversion.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Protocol, Self
@@ -94,6 +94,10 @@ class Branch:
     photodiode: int = 0
     """0 the large one, 1 the small one."""
 
+    def without(self, names: Collection[str]) -> Branch:
+        """Return the same readout without the effects of these names."""
+        return replace(self, effects=tuple(e for e in self.effects if e.name not in names))
+
 
 @dataclass(frozen=True, kw_only=True)
 class ReadoutChain:
@@ -131,12 +135,12 @@ class ReadoutChain:
         return cls(whole=Branch(circuit=circuit, adc=adc, effects=tuple(effects)), groups=groups)
 
     def with_effects(self, effects: Sequence[Effect]) -> Self:
-        """Return the chain with other effects running, and those of these names in its branches."""
-        names = {effect.name for effect in effects}
-        branches = tuple(
-            replace(branch, effects=tuple(e for e in branch.effects if e.name in names))
-            for branch in self.branches
-        )
+        """Return the chain with other effects running; its branches lose those that it loses.
+
+        A branch may have effects of its own, such as the dark current of a small photodiode.
+        """
+        lost = {e.name for e in self.whole.effects} - {e.name for e in effects}
+        branches = tuple(branch.without(lost) for branch in self.branches)
         whole = replace(self.whole, effects=tuple(effects))
         return replace(self, whole=whole, branches=branches)
 

@@ -152,7 +152,9 @@ def expose(seen: SceneLight, light: photon_rate.Rate, is_planned: bool = True) -
         collect(light_during(seen, light, start, stop), start, stop) for start, stop in steps
     )
     peak = (float(rate.max()) + dark) * time
-    refuse_too_much(max(peak, white * time, dark))
+    # A second photodiode has a dark current of its own.
+    darkest = max([dark, *(exposure.mean_dark(1.0, b.effects) for b in solved.chain.branches)])
+    refuse_too_much(max(peak, white * time, darkest, darkest * time))
     full = max(1.0, min(solved.chain.metered.full_well, peak))
     alone = not times and solved.binning is None
     signal = SignalLevels(

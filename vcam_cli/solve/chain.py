@@ -37,6 +37,8 @@ def readout_chain(
     chain = ReadoutChain.single(circuit, effects.adc, effects.enabled, groups)
     if not has_several(camera):
         return chain
-    branches = tuple(branch(each, geometry) for each in readouts(camera))
-    merge = camera_merge(camera, geometry)
-    return chain.branched(branches, merge).with_effects(effects.enabled)
+    every = [branch(each, geometry) for each in readouts(camera)]
+    branches = tuple(
+        one.without([e.name for e in one.effects if effects.is_off(e.name)]) for one in every
+    )
+    return chain.branched(branches, camera_merge(camera, geometry))
