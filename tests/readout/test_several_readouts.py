@@ -133,8 +133,9 @@ def test_a_pixel_is_saturated_where_all_its_readouts_are(tmp_path) -> None:
     assert np.all(found[:, 2] >= chain.saturated_dn)
 
 
+@pytest.mark.parametrize("effects", ["all", {"dark_current": "off"}])
 @pytest.mark.parametrize("large", [0, 1000])
-def test_small_photodiode_has_its_own_dark_signal(large, tmp_path) -> None:
+def test_small_photodiode_has_its_own_dark_signal(large, effects, tmp_path) -> None:
     """The merge subtracts it, and adds that of the large one: white stays where it was."""
     small = SMALL["small"] | {"dark_current": "400 e/s"}
     dark = {
@@ -142,6 +143,7 @@ def test_small_photodiode_has_its_own_dark_signal(large, tmp_path) -> None:
         "pixel.photodetector.dark_current": f"{large} e/s",
         "exposure.time": "1 s",
         "scene.radiance": radiance_for(300_000, 1.0),
+        "effects": effects,
     }
     frame = simulate(camera(tmp_path, PIXEL | dark)).frame
     merged = frame.chain.to_electrons(frame.dn.astype(float))

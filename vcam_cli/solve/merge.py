@@ -7,7 +7,7 @@ import numpy as np
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.readouts import Readout, readouts
-from vcam_cli.effects.base import Effect
+from vcam_cli.effects.base import Effect, switched_off
 from vcam_cli.effects.noise.quantization import Quantization
 from vcam_cli.effects.order import ORDER
 from vcam_cli.effects.pixel_signal import Charge
@@ -69,6 +69,8 @@ def _merged_readout(readout: Readout, geometry: Geometry) -> MergedReadout:
     chain = ReadoutChain(whole=found, groups=ALONE)
     sources = noise_sources(found.effects, "frame")
     own = sum(s.variance(0.0) for s in sources if s.sample_draws == "independent")
+    # Of noise the rule knows what the file describes; a dark signal is subtracted if there is one.
+    running = [e for e in found.effects if not switched_off(readout.camera, e.name)]
     return MergedReadout(
         name=readout.name,
         chain=chain,
@@ -78,5 +80,5 @@ def _merged_readout(readout: Readout, geometry: Geometry) -> MergedReadout:
         top=float(chain.to_electrons(np.array([chain.saturated_dn - 0.5]))[0]),
         own_variance=own + found.circuit.electrons_per_dn**2 / 12,
         common_variance=sum(s.variance(0.0) for s in sources if s.sample_draws == "common"),
-        dark_rate=mean_dark(1.0, found.effects),
+        dark_rate=mean_dark(1.0, tuple(running)),
     )
