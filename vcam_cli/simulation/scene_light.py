@@ -41,6 +41,8 @@ from vcam_cli.solve.solved import Solved
 
 ASSUMED = 0.9
 """Full signal over the scene's brightest light, as assumed before there is any signal."""
+PLACES = 64
+"""Places along each side of a picture at which its colors are looked at."""
 DARKER = 4.0
 """Full signal that a margin was made for over that of the array, above which it is widened: it errs
 by no more than this times its share of the tolerance, `bandwidth.MARGIN_SHARE`."""
@@ -148,7 +150,7 @@ def exposed_as(seen: SceneLight, solved: Solved, picture: ScenePicture) -> Scene
         The scene before this camera.
     """
     effects, scene = seen.path.effects, seen.scene
-    levels = _levels(solved, scene, seen.white_rate)
+    levels = _levels(solved, seen)
     overexposure = max(_rate_around(seen) / levels.ceiling, 1.0)
     if overexposure > 1:
         scene = _scene(solved, picture, effects, overexposure)
@@ -171,14 +173,16 @@ class _Levels:
     fullness: float
 
 
-def _levels(solved: Solved, scene: AnyScene, white_rate: Array) -> _Levels:
-    """Return the levels that an exposure sets. `white_rate` is as `SceneLight.white_rate`."""
+def _levels(solved: Solved, seen: SceneLight) -> _Levels:
+    """Return the levels that an exposure of a scene sets."""
+    scene, white_rate = seen.scene, seen.white_rate
     brightest, charges = float(white_rate.max()), solved.layout.binning_groups.summed_charges
     ceiling, full = (
         auto_exposure.ceiling(solved.exposure, brightest, saturation / charges)
         for saturation in (solved.electrical.saturation, solved.chain.metered.saturation)
     )
-    full = min(ASSUMED * _brightest(scene) * brightest, full)
+    share = _share_of_white(scene, seen.path.transfer.level)
+    full = min(ASSUMED * _brightest(scene) * share * brightest, full)
     return _Levels(ceiling, full, _fullness(solved, scene, float(white_rate.min())))
 
 
@@ -197,7 +201,7 @@ def rate_of_full(seen: SceneLight, solved: Solved) -> float:
     float
         Photo-electrons per second [e/s], as `OpticalPath.ceiling`.
     """
-    return _levels(solved, seen.scene, seen.white_rate).ceiling
+    return _levels(solved, seen).ceiling
 
 
 def formed_light(
@@ -400,6 +404,24 @@ def _brightest(scene: AnyScene) -> float:
     """Return a scene's brightest light, relative to white."""
     flat = scene.flat if isinstance(scene, DepthScene) else scene
     return flat.chart.brightest if isinstance(flat, HarmonicScene) else flat.brightest
+
+
+def _share_of_white(scene: AnyScene, level: Array) -> float:
+    """Return the most light that a color has of white as bright as a picture's largest sample.
+
+    Channels are seldom all bright in one place: pictures of leaves in three colors have two thirds
+    and were formed twice, each time as long as once. Places of a grid tell; only time depends on
+    it. `level` is the signal (K, C) of each channel [e/s].
+    """
+    if not isinstance(scene, ImageScene) or len(level) == 1:
+        return 1.0
+    if not isinstance(scene.picture, np.ndarray):  # samples stay in their file
+        return 1.0
+    rows, columns = (-(-n // PLACES) for n in scene.picture.shape[:2])
+    some = scene.picture[::rows, ::columns].reshape(-1, len(level))
+    white = float(some.max(initial=0.0)) * float(level.sum(axis=0).max())
+    light = float((some @ level).max(initial=0.0))
+    return light / white if 0 < light < white else 1.0
 
 
 def _rate_around(seen: SceneLight) -> float:
