@@ -18,9 +18,8 @@ from vcam_cli.image_formation.field_dependence import Mode
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.transfer_tables import Tables, TableSize, radial_table
 
-MODES_SHARE = 0.4
-"""Part of the tolerance for modes of the field that this picture does not need, by their bound:
-where light lies as their maps do, at a corner, they came within a third of it."""
+MODES_SHARE = 0.15
+"""Part of the tolerance for modes of the field that this picture does not need."""
 
 
 def changes_by_omission(
@@ -119,11 +118,11 @@ def needed_modes(
         Rms that all modes add [e/s].
     """
     light = np.array([image.rms(image.power.largest_power(mode.tables())) for mode in modes])
-    # Light may lie where a map is largest, and modes may err alike.
-    most = light * [float(np.abs(mode.map.values).max()) for mode in modes]
+    # Light may lie where a map is largest, at a corner of few pixels.
+    most = np.square(light * [float(np.abs(mode.map.values).max()) for mode in modes])
     allowed = MODES_SHARE * path.settings.tolerance * path.full
     weakest = np.argsort(most)
-    dropped = set(weakest[np.cumsum(most[weakest]) <= allowed].tolist())
+    dropped = set(weakest[np.cumsum(most[weakest]) <= allowed**2].tolist())
     kept = tuple(mode for i, mode in enumerate(modes) if i not in dropped)
     means = np.array([mode.map.mean_square for mode in modes])
     return kept, math.sqrt(float(means @ np.square(light)))
