@@ -114,7 +114,8 @@ def test_shifted_areas_collect_where_they_are():
                    microlens="optimal")  # fmt: skip
     x = ref.centers(16, 4e-6) * np.ones((12, 1))
     moved = x - 2e-6 * x / 150e-6  # straight rays: the shift is proportional to the place
-    level = ref.mean_electrons(camera(ref.Waves((1.0,), (0.0,), (0.0,), (0.0,)))).mean()
+    white = camera(ref.Waves((1.0,), (0.0,), (0.0,), (0.0,)), pupil=150e-6)  # of as wide a cone
+    level = ref.mean_electrons(white).mean()
     expected = 0.5 + 0.4 * np.sinc(f * 3e-6) * np.cos(2 * np.pi * f * moved + 0.3)
     assert ref.mean_electrons(setup) / level == pytest.approx(expected, abs=1e-4)
 
