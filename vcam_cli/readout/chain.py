@@ -94,7 +94,7 @@ class Branch:
     photodiode: int = 0
     """0 the large one, 1 the small one."""
 
-    def without(self, names: Collection[str]) -> Branch:
+    def without_effects(self, names: Collection[str]) -> Branch:
         """Return the same readout without the effects of these names."""
         return replace(self, effects=tuple(e for e in self.effects if e.name not in names))
 
@@ -140,7 +140,7 @@ class ReadoutChain:
         A branch may have effects of its own, such as the dark current of a small photodiode.
         """
         lost = {e.name for e in self.whole.effects} - {e.name for e in effects}
-        branches = tuple(branch.without(lost) for branch in self.branches)
+        branches = tuple(branch.without_effects(lost) for branch in self.branches)
         whole = replace(self.whole, effects=tuple(effects))
         return replace(self, whole=whole, branches=branches)
 

@@ -39,6 +39,7 @@ def readout_chain(
         return chain
     every = [branch(each, geometry) for each in readouts(camera)]
     branches = tuple(
-        one.without([e.name for e in one.effects if effects.is_off(e.name)]) for one in every
+        one.without_effects([e.name for e in one.effects if effects.is_off(e.name)])
+        for one in every
     )
     return chain.branched(branches, camera_merge(camera, geometry))
